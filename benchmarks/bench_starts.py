@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.starts import RandomStarts, SobolStarts
+from bubblefit.inference.search import RandomStarts, SobolStarts
 from bubblefit.project.project import read_project
 from bubblefit.runs.executor import Executor
 from bubblefit.runs.multistart import (

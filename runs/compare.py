@@ -16,8 +16,7 @@ from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
 from ..inference.problem import FitProblem, Optimum
 from ..inference.resampling import folds_of
-from ..inference.search import fit_from
-from ..inference.starts import feasible_start
+from ..inference.search import feasible_start, fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
 from ..materials.law import HypoelasticLaw

@@ -15,7 +15,7 @@ from ..inference.comparison import Comparison
 from ..inference.descent import DescentSettings, bounded_step, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
-from ..inference.starts import EstimatedStarts
+from ..inference.search import EstimatedStarts
 from ..inference.unknowns import Unknowns
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw

@@ -17,7 +17,7 @@ from ..inference.methods import FitOptions, method_named
 from ..inference.nuisance import Nuisance
 from ..inference.objective import FunctionObjective
 from ..inference.problem import FitProblem, Starts
-from ..inference.starts import EstimatedStarts, RandomStarts, SobolStarts
+from ..inference.search import EstimatedStarts, RandomStarts, SobolStarts
 from ..inference.unknowns import LawBounds, Unknowns
 from ..materials.law import HypoelasticLaw
 from ..meshes.mesh import Mesh

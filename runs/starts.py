@@ -16,8 +16,7 @@ from ..errors import NoFeasibleStart
 from ..experiments.run_records import strains_of
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem, Optimum
-from ..inference.search import fit_from
-from ..inference.starts import feasible_start
+from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import Array
 
 #: The mesh that a start ran on: the project's own, or the coarse one that precedes it.

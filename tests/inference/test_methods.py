@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.inference import methods
 from bubblefit.inference.methods import FitOptions, lm, method_names
-from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import feasible_start
+from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..support.refusals import complaint

@@ -4,8 +4,7 @@ import nlopt
 import numpy as np
 import pytest
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed, feasible_start
+from bubblefit.inference.search import allowed, feasible_start, fit_from
 
 from .cases import CUBIC, Failing, bubble_problem
 

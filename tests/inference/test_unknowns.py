@@ -5,8 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed, coefficients_at, dimensions, feasible_start
+from bubblefit.inference.search import (
+    allowed,
+    coefficients_at,
+    dimensions,
+    feasible_start,
+    fit_from,
+)
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.admissibility import closed_path
 from bubblefit.materials.forms import polynomial as forms

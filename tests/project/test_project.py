@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from bubblefit.experiments.base import Reach
-from bubblefit.inference.starts import allowed, coefficients_at, dimensions
+from bubblefit.inference.search import allowed, coefficients_at, dimensions
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.card import read_card
 from bubblefit.materials.forms.base import form_names

@@ -17,8 +17,14 @@ from bubblefit.inference.noise import Noise
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.reported import moduli_error
-from bubblefit.inference.search import approach, fit_from
-from bubblefit.inference.starts import allowed, coefficients_at, dimensions, feasible_start
+from bubblefit.inference.search import (
+    allowed,
+    approach,
+    coefficients_at,
+    dimensions,
+    feasible_start,
+    fit_from,
+)
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.law import HypoelasticLaw

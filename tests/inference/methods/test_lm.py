@@ -7,8 +7,7 @@ from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference.descent import descend
 from bubblefit.inference.methods import FitOptions, lm
 from bubblefit.inference.reported import moduli_error
-from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed, feasible_start
+from bubblefit.inference.search import allowed, feasible_start, fit_from
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.membrane.solver import MembraneSolver
