@@ -38,7 +38,7 @@ from ..readers.quantities import DIRECTION_ALIASES, FILL, WARP, columns_of
 from ..readers.tables import NUMBER, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS, split_unit
 from ..readers.values_in_files import number_in_name, values_in_file
-from .written import Settings
+from .sections import Settings
 
 #: What files may hold.
 FRAMES = "places and displacements of an image correlation"

@@ -41,7 +41,6 @@ from ..solvers.settings import SCHEDULER
 from ..storage.reading import is_file, missing_file_reason, read_bytes
 from ..storage.writing import write_text
 from .objects import PYTHON, Definition, Law, definition_of, plain
-from .read_tests import Folders, ReadTest, TestsOfFile
 from .schema import (
     FITTED_CARD,
     PARAMETERS,
@@ -56,7 +55,7 @@ from .schema import (
     usual_folder,
     validated,
 )
-from .written import InMemory, Settings, Written, project_text
+from .sections import Folders, InMemory, ReadTest, Settings, TestsOfFile, Written, project_text
 
 #: Units of all numbers in a project that is made from objects.
 UNITS = {"modulus": "MPa", "pressure": "MPa", "length": "mm"}

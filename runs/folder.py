@@ -33,7 +33,7 @@ from ..lazy_modules import pandas as pd
 from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..presenting import DRAWINGS, PAGES
 from ..project.project import Project
-from ..project.written import InMemory, project_text
+from ..project.sections import InMemory, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from ..storage.writing import (

@@ -128,7 +128,7 @@ def known_bars(patch: Any, solver: BarSolver) -> BarSolver:
 
 def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
     from bubblefit.project.project import Project
-    from bubblefit.project.written import Written
+    from bubblefit.project.sections import Written
 
     return Project(
         path=Path("bars.toml"),
