@@ -392,16 +392,17 @@ def pull_back(
 # compression makes the sum S + s1 + s2 less than S/2, S/2 takes its place; and w is kept between
 # -r2, where the fill yarns are straight, and r1, where the warp yarns are.
 #
-# Names: `bed` is S; `total` is S + s1 + s2, `pull` the same but at least S/2, and `free` 1 where
-# they are equal, else 0; `dg0, dg1` are D dc/dw, in `_balanced_exchange` half of it.
+# Names: `bed_stiffness` is S; `total` is S + s1 + s2, `pull` the same but at least S/2, and
+# `pull_slope` 1 where they are equal, else 0; `dg0, dg1` are D dc/dw, in `_balanced_exchange` half
+# of it.
 
 
 class Crimp(NamedTuple):
-    """The constants of a law with crimp: r1 = T1/S, r2 = T2/S, and bed, which is S (MPa)."""
+    """The constants of a law with crimp: r1 = T1/S, r2 = T2/S, and `bed_stiffness` S (MPa)."""
 
     r1: float
     r2: float
-    bed: float
+    bed_stiffness: float
 
 
 class PlaneStiffness(NamedTuple):
@@ -438,37 +439,37 @@ def _exchanged(
     """Return the exchange w at a stress with its derivatives dw/ds1, dw/ds2 (`by0`, `by1`).
 
     s0, s1 are s1, s2 above: stresses along warp and fill, MPa. Also writes dw/dT1, dw/dT2 and dw/dS
-    to the three entries of `slopes` from CRIMP; they follow from `by_r1`, `by_r2`, `by_bed`, the
-    derivatives of w by r1, r2 and S.
+    to the three entries of `slopes` from CRIMP; they follow from `by_r1`, `by_r2` and
+    `by_bed_stiffness`, the derivatives of w by r1, r2 and S.
     """
     r1 = crimp.r1
     r2 = crimp.r2
-    bed = crimp.bed
-    total = bed + s0 + s1
-    is_held = total < 0.5 * bed
-    pull = 0.5 * bed if is_held else total
+    bed_stiffness = crimp.bed_stiffness
+    total = bed_stiffness + s0 + s1
+    is_held = total < 0.5 * bed_stiffness
+    pull = 0.5 * bed_stiffness if is_held else total
     w = (r1 * s0 - r2 * s1) / pull
-    free = 0.0 if is_held else 1.0
-    by0 = (r1 - free * w) / pull
-    by1 = -(r2 + free * w) / pull
+    pull_slope = 0.0 if is_held else 1.0
+    by0 = (r1 - pull_slope * w) / pull
+    by1 = -(r2 + pull_slope * w) / pull
     by_r1 = s0 / pull
     by_r2 = -s1 / pull
-    by_bed = -w / (bed if is_held else pull)
+    by_bed_stiffness = -w / (bed_stiffness if is_held else pull)
     if w >= r1 or w <= -r2:
         by0 = 0.0
         by1 = 0.0
         by_r1 = 0.0
         by_r2 = 0.0
-        by_bed = 0.0
+        by_bed_stiffness = 0.0
         if w >= r1:
             w = r1
             by_r1 = 1.0
         else:
             w = -r2
             by_r2 = -1.0
-    slopes[CRIMP] = by_r1 / bed
-    slopes[CRIMP + 1] = by_r2 / bed
-    slopes[CRIMP + 2] = by_bed - (r1 * by_r1 + r2 * by_r2) / bed
+    slopes[CRIMP] = by_r1 / bed_stiffness
+    slopes[CRIMP + 1] = by_r2 / bed_stiffness
+    slopes[CRIMP + 2] = by_bed_stiffness - (r1 * by_r1 + r2 * by_r2) / bed_stiffness
     return w, by0, by1
 
 
@@ -497,7 +498,7 @@ def _balanced_exchange(
     """
     r1 = crimp.r1
     r2 = crimp.r2
-    bed = crimp.bed
+    bed_stiffness = crimp.bed_stiffness
     dh0 = slopes[TAKEN1]
     dh1 = slopes[TAKEN2]
     w = w_old
@@ -509,9 +510,9 @@ def _balanced_exchange(
         e1 = dh1 + (2.0 * r2 + w) * w - (2.0 * r2 + w_old) * w_old
         s_new[0] = s_old[0] + stiffness.d11 * e0 + stiffness.d12 * e1
         s_new[1] = s_old[1] + stiffness.d12 * e0 + stiffness.d22 * e1
-        total = bed + s_new[0] + s_new[1]
-        free = 1.0 if total >= 0.5 * bed else 0.0
-        pull = max(total, 0.5 * bed)
+        total = bed_stiffness + s_new[0] + s_new[1]
+        pull_slope = 1.0 if total >= 0.5 * bed_stiffness else 0.0
+        pull = max(total, 0.5 * bed_stiffness)
         off = w * pull - r1 * s_new[0] + r2 * s_new[1]
         if not off == off:
             return YarnIncrement(math.nan, e0, e1)
@@ -523,7 +524,7 @@ def _balanced_exchange(
             low = w
         dg0 = stiffness.d11 * (r1 - w) - stiffness.d12 * (r2 + w)
         dg1 = stiffness.d12 * (r1 - w) - stiffness.d22 * (r2 + w)
-        steep = pull + 2.0 * ((r1 - free * w) * dg0 - (r2 + free * w) * dg1)
+        steep = pull + 2.0 * ((r1 - pull_slope * w) * dg0 - (r2 + pull_slope * w) * dg1)
         newton = w - off / steep if steep > 0.0 else math.inf
         if not (low < newton < high):
             # The ends are exchanges of their own, where one yarn is straight.
@@ -562,12 +563,12 @@ def exchange(
     bool
         False where S is not positive, or no exchange with a regular tangent is found.
     """
-    bed = coupling[5]
-    if not bed > 0.0:
+    bed_stiffness = coupling[5]
+    if not bed_stiffness > 0.0:
         return False
-    r1 = coupling[3] / bed
-    r2 = coupling[4] / bed
-    crimp = Crimp(r1, r2, bed)
+    r1 = coupling[3] / bed_stiffness
+    r2 = coupling[4] / bed_stiffness
+    crimp = Crimp(r1, r2, bed_stiffness)
     w_old, old0, old1 = _exchanged(s_old[0], s_old[1], crimp, slopes)
     by_old = slopes[CRIMP], slopes[CRIMP + 1], slopes[CRIMP + 2]
     w, e0, e1 = _balanced_exchange(
@@ -609,8 +610,8 @@ def exchange(
         slopes[BEHIND + 2 * i + 1] = through_ahead * old1
     # For CRIMP: - D dc/d(T1, T2, S) at a fixed stress, the end less the start. by_r1 and by_r2 are
     # the derivatives of 2 r1 and of -2 r2 by (T1, T2, S): those of c at fixed w are by_r w.
-    by_r1 = (2.0 / bed, 0.0, -2.0 * r1 / bed)
-    by_r2 = (0.0, -2.0 / bed, 2.0 * r2 / bed)
+    by_r1 = (2.0 / bed_stiffness, 0.0, -2.0 * r1 / bed_stiffness)
+    by_r2 = (0.0, -2.0 / bed_stiffness, 2.0 * r2 / bed_stiffness)
     for k in range(3):
         c0 = g0 * slopes[CRIMP + k] - g0_old * by_old[k] + by_r1[k] * (w - w_old)
         c1 = g1 * slopes[CRIMP + k] - g1_old * by_old[k] + by_r2[k] * (w - w_old)
@@ -627,7 +628,7 @@ def stress_update(
     law: CompiledLaw,
     before: PointState,
     after: PointState,
-    written: LawTangent,
+    response: LawTangent,
 ) -> bool:
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
@@ -639,7 +640,7 @@ def stress_update(
     after : PointState
         Its strain is that of the end, its stress is written. For a law with a memory the strains
         of both states are (9,) as in `memory.py`, and strain[3:] is written.
-    written : LawTangent
+    response : LawTangent
         Its `tangent` d(stress)/d(strain) and its `slopes` are written. In `slopes`, D11 to D22_E2,
         D11_NU and D22_NU are the plane stiffness and its derivatives, G12 the shear modulus, all
         means over the increment. BEFORE1 to BEFORE3 are the derivatives of the mean E1, E2, G12 by
@@ -656,7 +657,7 @@ def stress_update(
         False when a modulus or 1 - nu12 nu21 is not positive, when the load ratio is not found
         (`mean_ratio`), or the exchange of crimp (`exchange`).
     """
-    return _integrate(law, law.coupling, before, after, written)
+    return _integrate(law, law.coupling, before, after, response)
 
 
 @compiled(internal=True)
@@ -665,7 +666,7 @@ def _integrate(
     coupling: Coupling,
     before: PointState,
     after: PointState,
-    written: LawTangent,
+    response: LawTangent,
 ) -> bool:
     """Integrate as `stress_update`.
 
@@ -677,8 +678,8 @@ def _integrate(
     h_old = before.strain
     s_old = before.stress
     s_new = after.stress
-    tangent = written.tangent
-    slopes = written.slopes
+    tangent = response.tangent
+    slopes = response.slopes
     warp, warp_slope, warp_before = increment_modulus(pieces, WARP, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, FILL, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, SHEAR, h[2], h_old[2])
@@ -825,7 +826,7 @@ def referred_stress(
     ratio: float,
     growth: tuple[float, float, float],
     s: Array,
-    written: PointResponse,
+    response: PointResponse,
 ) -> None:
     """Write the 2nd Piola-Kirchhoff stress of a Cauchy stress, and its derivative by E.
 
@@ -839,21 +840,21 @@ def referred_stress(
         Derivative of log(ratio) by the log strain.
     s : (3,) array, MPa
         Corotated Cauchy stress; left as it was.
-    written : PointResponse
+    response : PointResponse
         `law.tangent` and `strain_slope` are read; `pk2`, `stiffness` and `pull` are written.
     """
-    stiffness = written.stiffness
-    p = written.strain_slope
-    law_tangent = written.law.tangent
-    pull = written.pull
-    work = written.work
+    stiffness = response.stiffness
+    p = response.strain_slope
+    law_tangent = response.law.tangent
+    pull = response.pull
+    work = response.work
     t0 = s[0]
     t1 = s[1]
     t2 = s[2]
     s[0] *= ratio
     s[1] *= ratio
     s[2] *= ratio
-    pull_back(green, s, written.pk2, pull, stiffness)
+    pull_back(green, s, response.pk2, pull, stiffness)
     s[0] = t0
     s[1] = t1
     s[2] = t2
@@ -879,7 +880,7 @@ def membrane_stress(
     green: CauchyGreen,
     before: PointState,
     after: PointState,
-    written: PointResponse,
+    response: PointResponse,
 ) -> bool:
     """Write strain, stress, 2nd Piola-Kirchhoff stress and its derivative by E after an increment.
 
@@ -894,7 +895,7 @@ def membrane_stress(
         Log strain and Cauchy stress at its start.
     after : PointState
         Log strain and Cauchy stress at its end; written.
-    written : PointResponse
+    response : PointResponse
         Written.
 
     Returns
@@ -902,11 +903,11 @@ def membrane_stress(
     bool
         False where `log_strain` or `stress_update` returns it; nothing written counts then.
     """
-    if not log_strain(green, after.strain, written.strain_slope):
+    if not log_strain(green, after.strain, response.strain_slope):
         return False
-    if not stress_update(law, before, after, written.law):
+    if not stress_update(law, before, after, response.law):
         return False
     ratio = math.exp(law.area_power * (after.strain[0] + after.strain[1]))
     growth = (law.area_power, law.area_power, 0.0)
-    referred_stress(green, ratio, growth, after.stress, written)
+    referred_stress(green, ratio, growth, after.stress, response)
     return True

@@ -55,14 +55,14 @@ class FabricIncrement(NamedTuple):
         Log strain of the surface at the end.
     after : PointState
         Strain and stress of the fabric at the end; written.
-    written : LawTangent
+    response : LawTangent
     """
 
     law: CompiledLaw
     before: PointState
     total: Array
     after: PointState
-    written: LawTangent
+    response: LawTangent
 
 
 class Wrinkle(NamedTuple):
@@ -91,7 +91,7 @@ class WrinkleWork(NamedTuple):
     ----------
     total : (3,) ndarray
         Log strain of the surface.
-    carried : (3,) ndarray, MPa
+    membrane_stress : (3,) ndarray, MPa
         Stress of the membrane: that of the fabric less what resists the wrinkle strain.
     strain_slope : (3, 3) ndarray
         Derivative of the fabric's strain by the total strain.
@@ -101,7 +101,7 @@ class WrinkleWork(NamedTuple):
     """
 
     total: Array
-    carried: Array
+    membrane_stress: Array
     strain_slope: Array
     wrinkle: Wrinkle
     stiffness_left: Array
@@ -160,7 +160,7 @@ def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> b
     """
     for i in range(3):
         increment.after.strain[i] = increment.total[i] + size * n[i]
-    return stress_update(increment.law, increment.before, increment.after, increment.written)
+    return stress_update(increment.law, increment.before, increment.after, increment.response)
 
 
 @compiled(internal=True)
@@ -173,7 +173,7 @@ def _size_without_stress_across(increment: FabricIncrement, n: Array) -> float:
         `Wrinkle.normal`, which is fixed.
     """
     s = increment.after.stress
-    tangent = increment.written.tangent
+    tangent = increment.response.tangent
     size = 0.0
     scale = 1e-3
     for _ in range(MAX_ITERATIONS):
@@ -234,7 +234,7 @@ def _newton(
 ) -> tuple[float, float]:
     """Return angle and size of the wrinkle strain by Newton's method; NaN if not found."""
     s = increment.after.stress
-    tangent = increment.written.tangent
+    tangent = increment.response.tangent
     n = wrinkle.normal
     m = wrinkle.along
     inverse = wrinkle.inverse
@@ -277,11 +277,11 @@ def slack(increment: FabricIncrement) -> bool:
     """Search the strain at which the fabric has no stress, and write it; False if not found."""
     he = increment.after.strain
     s = increment.after.stress
-    tangent = increment.written.tangent
+    tangent = increment.response.tangent
     for i in range(3):
         he[i] = increment.before.strain[i]
     for _ in range(MAX_ITERATIONS):
-        if not stress_update(increment.law, increment.before, increment.after, increment.written):
+        if not stress_update(increment.law, increment.before, increment.after, increment.response):
             return False
         det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
         if not (det > 0.0 and tangent[2, 2] > 0.0):
@@ -334,7 +334,7 @@ def _wrinkled(
             angle, size = _newton(increment, wrinkle, angle, size)
     if math.isnan(size):
         return False
-    _write_strain_slope(increment.written.tangent, size, work)
+    _write_strain_slope(increment.response.tangent, size, work)
     return True
 
 
@@ -380,7 +380,7 @@ def _wrinkled_as_before(increment: FabricIncrement, strain: Array, work: Wrinkle
     angle, size = _newton(increment, work.wrinkle, angle, size)
     if math.isnan(size):
         return False
-    _write_strain_slope(increment.written.tangent, size, work)
+    _write_strain_slope(increment.response.tangent, size, work)
     return True
 
 
@@ -392,14 +392,14 @@ SLACK = np.int64(2)
 
 
 @compiled(internal=True)
-def _carried_with_wrinkles(increment: FabricIncrement, share: float, work: WrinkleWork) -> None:
+def _stress_with_wrinkles(increment: FabricIncrement, share: float, work: WrinkleWork) -> None:
     """Write the stress with what resists the wrinkle strain, and its derivative as the tangent.
 
     Arguments as those of `relaxed_update`.
     """
     pieces = increment.law.pieces
     nu = increment.law.coupling[0]
-    tangent = increment.written.tangent
+    tangent = increment.response.tangent
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
     stiffness = work.stiffness_left
@@ -410,9 +410,11 @@ def _carried_with_wrinkles(increment: FabricIncrement, share: float, work: Wrink
     stiffness[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
     total = work.tangent
     for i in range(3):
-        work.carried[i] = increment.after.stress[i]
+        work.membrane_stress[i] = increment.after.stress[i]
         for j in range(3):
-            work.carried[i] -= stiffness[i, j] * (increment.after.strain[j] - increment.total[j])
+            work.membrane_stress[i] -= stiffness[i, j] * (
+                increment.after.strain[j] - increment.total[j]
+            )
             total[i, j] = stiffness[i, j]
             for k in range(3):
                 total[i, j] += (tangent[i, k] - stiffness[i, k]) * work.strain_slope[k, j]
@@ -432,12 +434,12 @@ def _relaxed_update(increment: FabricIncrement, share: float, work: WrinkleWork)
     for i in range(3):
         he[i] = h[i]
         strain_slope[i, i] = 1.0
-    if not stress_update(increment.law, increment.before, increment.after, increment.written):
+    if not stress_update(increment.law, increment.before, increment.after, increment.response):
         return NO_STRESS
-    stiffness = increment.written.tangent[0, 0]
+    stiffness = increment.response.tangent[0, 0]
     if smaller_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * stiffness:
         for i in range(3):
-            work.carried[i] = s_new[i]
+            work.membrane_stress[i] = s_new[i]
         return TAUT
     t0 = s_new[0]
     t1 = s_new[1]
@@ -460,7 +462,7 @@ def _relaxed_update(increment: FabricIncrement, share: float, work: WrinkleWork)
         s_new[2] = t2
         if not _wrinkled(increment, slack_angle, slack_size, work):
             return NO_STRESS
-    _carried_with_wrinkles(increment, share, work)
+    _stress_with_wrinkles(increment, share, work)
     return state
 
 
@@ -471,11 +473,11 @@ def relaxed_update(increment: FabricIncrement, share: float, work: WrinkleWork) 
     Parameters
     ----------
     increment : FabricIncrement
-        Its `written.tangent` becomes the derivative of `work.carried` by the total strain.
+        Its `response.tangent` becomes the derivative of `work.membrane_stress` by the total strain.
     share : float
         Share of the stiffness at zero strain that resists the wrinkle strain.
     work : WrinkleWork
-        Its `carried` and `strain_slope` are written.
+        Its `membrane_stress` and `strain_slope` are written.
 
     Returns
     -------
@@ -492,7 +494,7 @@ def relaxed_membrane_stress(
     green: CauchyGreen,
     share: float,
     wrinkle_strain: Array,
-    written: PointResponse,
+    response: PointResponse,
     work: WrinkleWork,
 ) -> np.int64:
     """Write stress and stiffness of a membrane that may wrinkle, as `membrane_stress` does.
@@ -500,14 +502,14 @@ def relaxed_membrane_stress(
     Parameters
     ----------
     increment : FabricIncrement
-        Its `total` is written from `green`; its `written` is `written.law`.
+        Its `total` is written from `green`; its `response` is `response.law`.
     green : CauchyGreen
         Deformation of the surface at the end of the increment.
     share : float
         Share of the stiffness at zero strain that resists the wrinkle strain.
     wrinkle_strain : (3,) array
         That of the last evaluation, from which the search starts; written.
-    written : PointResponse
+    response : PointResponse
     work : WrinkleWork
         Both are written.
 
@@ -517,11 +519,11 @@ def relaxed_membrane_stress(
         State, as of `relaxed_update`.
     """
     h = increment.total
-    if not log_strain(green, h, written.strain_slope):
+    if not log_strain(green, h, response.strain_slope):
         return NO_STRESS
     state = WRINKLED
     if _wrinkled_as_before(increment, wrinkle_strain, work):
-        _carried_with_wrinkles(increment, share, work)
+        _stress_with_wrinkles(increment, share, work)
     else:
         state = _relaxed_update(increment, share, work)
     if state < 0:
@@ -537,7 +539,7 @@ def relaxed_membrane_stress(
         area_power * (slope[0, 1] + slope[1, 1]),
         area_power * (slope[0, 2] + slope[1, 2]),
     )
-    referred_stress(green, ratio, growth, work.carried, written)
+    referred_stress(green, ratio, growth, work.membrane_stress, response)
     return state
 
 
@@ -567,10 +569,10 @@ def relaxed_increments(
     he = np.empty(h.shape)
     s = np.empty(h.shape)
     work = wrinkle_work()
-    written = point_response().law
+    response = point_response().law
     for i in range(len(h)):
         before = PointState(h_old[i], s_old[i])
-        increment = FabricIncrement(law, before, h[i], PointState(he[i], s[i]), written)
+        increment = FabricIncrement(law, before, h[i], PointState(he[i], s[i]), response)
         if _relaxed_update(increment, 0.0, work) < 0:
             he[i] = np.nan
             s[i] = np.nan

@@ -21,7 +21,7 @@ def relaxed_update_of(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
     after = PointState(he, s)
     increment = FabricIncrement(law.compiled, before, np.array(h, float), after, written)
     state = relaxed_update(increment, share, work)
-    return state, he, s, work.carried, written.tangent, work.strain_slope
+    return state, he, s, work.membrane_stress, written.tangent, work.strain_slope
 
 
 def principal(a, b, c):
