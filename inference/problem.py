@@ -162,10 +162,12 @@ class FitProblem:
             if comparison.nuisance != self.unknowns.nuisance.comparisons.get(comparison.name, ()):
                 problem = f"the nuisance of {comparison.name} is not among the unknowns"
                 raise InputError(None, "unknowns", problem)
+        # Numbers of residuals of each block: comparisons in turn, and the priors last.
         sizes = [size for comparison in self.comparisons for size in comparison.objective.sizes]
         prior_count = len(self.unknowns.nuisance.priors[0])
         sizes += [prior_count] if prior_count else []
         self.blocks = Blocks(sizes)
+        # `_norms_of_equal_weights` needs the blocks, first without those norms.
         if self._weighs_by_noise:
             self.blocks = Blocks(sizes, self._norms_of_equal_weights)
 

@@ -303,7 +303,11 @@ class Definition:
         return argument_of(field, data_table(self.kind))
 
     def place(self, fabric: Fabric, need_data: bool) -> ObjectPlace:
-        """Return the place for reading the test; raise InputError if needed data are missing."""
+        """Return what the reading of the test needs: its name for errors, units, fabric, arrays.
+
+        Raise InputError if data are needed and none are given; whether files exist is checked by
+        the readers.
+        """
         if need_data and self.data_argument is not None and not self.has_data:
             problem = "is needed, or `read` of files: without data a test is simulated, not fitted"
             raise InputError(self.name, self.data_argument, problem)

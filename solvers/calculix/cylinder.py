@@ -594,25 +594,30 @@ def analyse(
     folder = setup.templates
 
     decks = cylinder_decks(model, law, solids, folder=folder)
-    start, filling = run(decks, partial(_inflated_cylinder, model, solids))
+    inflated, inflated_volumes = run(decks, partial(_inflated_cylinder, model, solids))
     read_bending = partial(bent_cylinder, model, solids)
+    # Volumes (mm^3) without pressure and at each pressure of the inflation give dV/dp.
     initial_volume = volumes(model, np.zeros((1, *model.mesh.points.shape)))
-    slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([initial_volume, filling]))
-    gas = np.zeros(1), np.full(1, model.pressure)
+    pressures = np.array([0.0, *model.inflation])
+    volume_slope = compliance(pressures, np.concatenate([initial_volume, inflated_volumes]))
+    gas_curve = np.zeros(1), np.full(1, model.pressure)
     for number in range(1, GAS_PASSES.max_passes + 1):
-        context = bending_context(model, solids, start, gas)
+        context = bending_context(model, solids, inflated, gas_curve)
         decks = cylinder_decks(model, law, solids, context, folder)
         bent: BentCylinder = run(decks, read_bending, read_bending)
-        deck_pressure = np.interp(bent.deflection, *gas)
+        deck_pressure = np.interp(bent.deflection, *gas_curve)
         closed = model.gas.closed_in(model.pressure, bent.volume[0])
         gap = gas_pressure(closed, bent.volume) - deck_pressure
         largest_gap = np.abs(gap).max() / (model.pressure + model.gas.ambient)
         log.info("pass %d to %.4g mm: p V within %.1e", number, bent.deflection[-1], largest_gap)
         if largest_gap <= GAS_PASSES.tolerance or number == GAS_PASSES.max_passes:
             break
-        gas = bent.deflection, better_pressure(closed, bent.volume, deck_pressure, slope)
-    history = bending_history(model, bent, gas)
-    rise = 1e3 * (np.interp(bent.deflection, *gas)[-1] - model.pressure)
+        gas_curve = (
+            bent.deflection,
+            better_pressure(closed, bent.volume, deck_pressure, volume_slope),
+        )
+    history = bending_history(model, bent, gas_curve)
+    rise = 1e3 * (np.interp(bent.deflection, *gas_curve)[-1] - model.pressure)
     words = f"gas: pass {number}, p V constant within {largest_gap:.1e} "
     words += f"(wanted: {GAS_PASSES.tolerance:g}), pressure {rise:+.3g} kPa at the end"
     return replace(history, remarks=(*history.remarks, Note(GAS, words)))

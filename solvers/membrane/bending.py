@@ -183,10 +183,15 @@ class BendingAnalysis:
         self.displacement_slopes: list[Array] = []
         self.push_slopes: list[Array] = []
         self.wrinkled: list[float] = []
+        #: Wrinkle strain (quads, 4, 3) at the start of the present increment.
         self.wrinkle = self.membrane.wrinkle.copy()
         self.snaps: list[float] = []
-        self.wrinkle_force = 0.0
+        #: Largest force (N, on the meshed part) with which the stiffness left across wrinkles
+        #: resists the collars in an increment: the magnitude of its work over their motion.
+        self.max_wrinkle_force = 0.0
+        #: Largest depth (mm) of a rigid body in the membrane, of all increments.
         self.deepest = 0.0
+        #: Why the bending ended early, "" if it did not.
         self.early = ""
 
     def start(self) -> None:
@@ -249,7 +254,7 @@ class BendingAnalysis:
         self.wrinkle = membrane.wrinkle.copy()
         membrane.accept()
         self._record(travel, displacement, membrane.pressure, membrane.volume)
-        self.wrinkle_force = max(self.wrinkle_force, abs(work) / step)
+        self.max_wrinkle_force = max(self.max_wrinkle_force, abs(work) / step)
         position = membrane.reference + displacement
         depths = [-float(gaps(body, position)[0].min()) for body in membrane.bodies]
         self.deepest = max(self.deepest, *depths)
@@ -345,9 +350,8 @@ class BendingAnalysis:
         stiffness = self.membrane.wrinkle_stiffness
         if stiffness is not None and largest_push > 0:
             words = (
-                f"what stiffness is left to wrinkles ({stiffness:g} of the taut "
-                f"fabric's) carries {100 * self.wrinkle_force / largest_push:.2g} % of the largest "
-                "load"
+                f"what stiffness is left to wrinkles ({stiffness:g} of the taut fabric's) "
+                f"carries {100 * self.max_wrinkle_force / largest_push:.2g} % of the largest load"
             )
             remarks.append(Note(WRINKLES, words))
         return remarks
