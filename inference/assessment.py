@@ -1,21 +1,36 @@
-"""The uncertainty of the moduli that a finished fit reports, and warnings that follow from it.
+"""Assess a finished fit: uncertainty of its moduli, a wrong form of its law, warnings of both.
 
-It combines the noise of the data, the error of the mesh and second-order terms of the fit.
+The uncertainty combines the noise of the data, the error of the mesh and second-order terms of the
+fit. The form of law or model is tested by the discrepancy of each comparison.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError, SolverFailure
 from ..materials.forms.base import SHEAR, Array
 from ..materials.forms.symmetry import modulus_labels
-from ..materials.law import HypoelasticLaw
+from ..materials.law import HypoelasticLaw, ThicknessChange
+from ..meshes.bubble_model import BubbleModel
 from ..notes import Note
-from .discrepancy import Discrepancy, notes_of_discrepancies
+from .discrepancy import (
+    SMOOTH_DEGREE,
+    Cause,
+    Discrepancy,
+    ModulusChange,
+    has_enough_values,
+    notes_of_discrepancies,
+    ranked_causes,
+    shape_count,
+    sheet_discrepancy,
+    smooth_shapes,
+    specimen_discrepancy,
+)
 from .linear import (
     MESH_ERROR_LEFT,
     PRIOR,
@@ -38,7 +53,6 @@ from .reported import (
     uncertain_words,
 )
 from .shear_valley import OPEN_SHEAR, OPEN_WORDS, ValleySearch, with_open_shear
-from .wrong_form import discrepancies
 
 #: Share of the strains at which G12 must be determined for one law to stand for all.
 LEAST_DETERMINED = 0.5
@@ -318,3 +332,185 @@ def residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:
         if not quantities:
             rows_of[comparison.name] = rows
     return rows_of
+
+
+def discrepancies(
+    problem: FitProblem,
+    residual: Array,
+    mesh_doubt: Array,
+    best: Evaluation,
+    modulus_change: ModulusChange,
+) -> dict[str, Discrepancy]:
+    """Return the discrepancy of each comparison on a sheet or of several specimens, by its name.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    residual : (m,) array
+        Residual of the whole fit.
+    mesh_doubt : (m,) array
+        Part of the residual that the mesh may cause.
+    best : Evaluation
+        The optimum. Causes are looked for, and specimens tested, only if it has its Jacobian.
+    modulus_change : callable
+        See `discrepancy.ModulusChange`.
+    """
+    discrepancy_of = {}
+    for k, comparison in enumerate(problem.comparisons):
+        fitted = _FittedComparison(problem, k, residual, best, modulus_change)
+        if fitted.objective.specimens is not None:
+            discrepancy = fitted.specimen_discrepancy()
+        else:
+            discrepancy = fitted.sheet_discrepancy(mesh_doubt)
+        if discrepancy is None:
+            continue
+        measured = fitted.objective.measured
+        if measured.any():
+            relative_rms = discrepancy.rms / float(np.sqrt(np.mean(measured**2)))
+            discrepancy = replace(discrepancy, relative_rms=relative_rms)
+        discrepancy_of[comparison.name] = discrepancy
+    return discrepancy_of
+
+
+@dataclass(eq=False)
+class _FittedComparison:
+    """A comparison of a fit; residual (n,) and slopes (n, unknowns) are in the unit of its data."""
+
+    problem: FitProblem
+    number: int
+    residual: Array
+    best: Evaluation
+    modulus_change: ModulusChange
+
+    def __post_init__(self) -> None:
+        self.comparison = self.problem.comparisons[self.number]
+        self.objective = self.comparison.objective
+        self.rows = self.problem.rows(self.number)
+        self.scale = self.problem.scale[self.rows]
+        self.residual = self.residual[self.rows] * self.scale
+        self.slopes = None
+        if self.best.jacobian is not None:
+            self.slopes = self.best.jacobian[self.rows] * self.scale[:, None]
+
+    def sheet_discrepancy(self, mesh_doubt: Array) -> Discrepancy | None:
+        """Return the discrepancy on a sheet; None for values that do not lie on one.
+
+        Parameters
+        ----------
+        mesh_doubt : (m,) array
+            Part of the residuals of all comparisons that the mesh may cause.
+        """
+        positions = self.objective.positions
+        if not positions or positions[0].shape[1] != 2:
+            return None
+        discrepancy = sheet_discrepancy(
+            self.objective.split(self.residual),
+            self.objective.split(mesh_doubt[self.rows] * self.scale),
+            positions,
+            self.problem.unknowns.count,
+            self.objective.unit,
+        )
+        if discrepancy is None:
+            return None
+        noise_of_mean = self.objective.least_noise / float(np.sqrt(len(self.scale)))
+        discrepancy = replace(
+            discrepancy, noise_of_mean=noise_of_mean, has_known_sheet=self._has_known_sheet()
+        )
+        if discrepancy.is_systematic:
+            discrepancy = replace(discrepancy, causes=self._sheet_causes())
+        return discrepancy
+
+    def _has_known_sheet(self) -> bool:
+        """Return whether the shape of the sheet without load is measured, or fitted by modes."""
+        model = self.comparison.model
+        if not isinstance(model, BubbleModel):
+            return False
+        return bool(model.modes) or bool(model.mesh.points[:, 2].any())
+
+    def specimen_discrepancy(self) -> Discrepancy | None:
+        """Return the discrepancy of specimens; None without derivatives."""
+        specimen_of = self.objective.specimens
+        if self.slopes is None or specimen_of is None:
+            return None
+        specimens = [np.flatnonzero(specimen_of == number) for number in np.unique(specimen_of)]
+        order = np.concatenate(specimens)
+        causes = {description: column[order] for description, column in self._causes().items()}
+        positions = self.objective.positions[0][:, 0]
+        return specimen_discrepancy(
+            [self.residual[points] for points in specimens],
+            [positions[points] for points in specimens],
+            [self.slopes[points] for points in specimens],
+            self.objective.unit,
+            causes,
+            self.modulus_change,
+        )
+
+    def _causes(self) -> dict[str, Array]:
+        """Return the causes that the objective knows, (n, k) by description."""
+        causes = self.objective.causes(self.best.histories[self.number])
+        return {name: column * self.scale[:, None] for name, column in causes.items()}
+
+    def _sheet_causes(self) -> tuple[Cause, ...]:
+        """Return the causes of a discrepancy on a sheet, from amplitudes of smooth shapes."""
+        if self.slopes is None:
+            return ()
+        causes = {**self._causes(), **self._other_thickness(), **self._outlying_points()}
+        columns = np.column_stack([self.residual, self.slopes, *causes.values()])
+        blocks = self.objective.split(columns)
+        amplitudes = []
+        for block, positions in zip(blocks, self.objective.positions, strict=True):
+            if has_enough_values(block):
+                shapes = smooth_shapes(positions)[:, : shape_count(SMOOTH_DEGREE)]
+                amplitudes.append(shapes.T @ block)
+        widths = [1, self.slopes.shape[1], *(column.shape[1] for column in causes.values())]
+        parts = np.split(np.concatenate(amplitudes), np.cumsum(widths)[:-1], axis=1)
+        residual, slopes, *cause_parts = parts
+        causes = dict(zip(causes, cause_parts, strict=True))
+        return ranked_causes(residual[:, 0], slopes, causes, self.modulus_change)
+
+    def _outlying_points(self, *, deviations: float = 12.0) -> dict[str, Array]:
+        """Return values far from all others of their block as a possible cause.
+
+        The result maps its description to the change (n, 1) of the residual without them; it is
+        empty where none is so far off.
+
+        Parameters
+        ----------
+        deviations : float
+            Limit of the distance from the median of the block, in median absolute deviations.
+        """
+        change = np.zeros_like(self.residual)
+        ends = np.cumsum(self.objective.sizes)
+        for end, size in zip(ends, self.objective.sizes, strict=True):
+            block = self.residual[end - size : end]
+            distance = np.abs(block - np.median(block))
+            is_outlying = distance > deviations * np.median(distance)
+            change[end - size : end] = -block * is_outlying
+        count = int(np.count_nonzero(change))
+        if not count:
+            return {}
+        remedy = "bubblefit check; leave such points out: flag_column"
+        return {f"{{:.0%}} of {count} values far off all others ({remedy})": change[:, None]}
+
+    def _other_thickness(self) -> dict[str, Array]:
+        """Return the other thickness option as a possible cause, by a run with it.
+
+        The result maps its description to the change (n, 1) of the residual; it is empty for an
+        external solver, or if the run fails.
+        """
+        if self.problem.solver.external:
+            return {}
+        unknowns = self.problem.unknowns
+        law = unknowns.law(self.problem.law, self.best.unknowns)
+        is_constant = law.thickness_change == "constant"
+        option: ThicknessChange = "incompressible" if is_constant else "constant"
+        other_law = replace(law, thickness_change=option)
+        nuisance = unknowns.nuisance_values(self.comparison.name, self.best.unknowns)
+        try:
+            history = self.comparison.run(other_law, unknowns.free, nuisance, warm=False)
+        except (InputError, SolverFailure):
+            return {}
+        residual = self.objective.residual(history, nuisance)
+        change = residual - self.objective.residual(self.best.histories[self.number], nuisance)
+        description = f'thickness_change = "{option}", {{:.0%}} of its effect'
+        return {description: (change * self.scale)[:, None]}

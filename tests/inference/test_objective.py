@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from bubblefit.inference.assessment import discrepancies
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.noise import Noise, correlated_count_of, misfits
 from bubblefit.inference.objective import Blocks, Objective
 from bubblefit.inference.resampling import rows_of
-from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..support.refusals import complaint

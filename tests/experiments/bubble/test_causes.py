@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.inference.wrong_form import discrepancies
+from bubblefit.inference.assessment import discrepancies
 from bubblefit.project.project import read_project
 from scipy.spatial.transform import Rotation
 
