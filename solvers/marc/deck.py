@@ -18,7 +18,6 @@ from ..decks import render
 from ..prescribed import held_dofs
 from .settings import MarcSettings
 
-JOB = "job"
 #: Residual force and displacement, relative (thesis, section 2.2).
 TOLERANCE = 1e-3
 MEMBRANE = 18

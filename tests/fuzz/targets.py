@@ -28,8 +28,8 @@ from bubblefit.readers.values_in_files import values_in_file
 from bubblefit.runs.law_setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.export_formats import FORMATS
-from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
+from bubblefit.solvers.marc.solver import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 from openpyxl import Workbook
 
