@@ -37,15 +37,12 @@ SOLVERS: dict[str, Callable[..., Solver]] = {
     offer.name: offer
     for offer in (
         SolverOffer(
-            "calculix",
-            f"{__package__}.calculix",
-            "CalculixSolver",
-            "executable:CalculixSettings",
+            "calculix", "calculix.solver:CalculixSolver", "calculix.executable:CalculixSettings"
         ),
-        SolverOffer("command", f"{__package__}.command", "CommandSolver", "solver:CommandSettings"),
-        SolverOffer("marc", f"{__package__}.marc", "MarcSolver", "settings:MarcSettings"),
+        SolverOffer("command", "command:CommandSolver", "command:CommandSettings"),
+        SolverOffer("marc", "marc.solver:MarcSolver", "marc.settings:MarcSettings"),
         SolverOffer(
-            "membrane", f"{__package__}.membrane", "MembraneSolver", "settings:MembraneSettings"
+            "membrane", "membrane.solver:MembraneSolver", "membrane.settings:MembraneSettings"
         ),
     )
 }

@@ -1,9 +1,9 @@
 """Settings that every solver has in common: `[solver.NAME]` of a project file."""
 
-import importlib
 import os
 import re
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -185,16 +185,12 @@ class SolverOffer:
     Attributes
     ----------
     name : str
-    package : str
-        Package whose module `solver` has the class, and `diagnose(named)`, a list of `Diagnosis`.
-    solver : str
-        Name of the class.
-    settings_class : str
-        "module:class" of the settings in the package, imported when they are needed.
+    solver, settings_class : str
+        "module:class" of the solver and of its settings, imported when they are needed. The module
+        of the solver has `diagnose(named)`, which returns a list of `Diagnosis`.
     """
 
     name: str
-    package: str
     solver: str
     settings_class: str
 
@@ -202,12 +198,16 @@ class SolverOffer:
     def settings(self) -> type[SolverSettings]:
         """Return the class of its settings."""
         module, _, name = self.settings_class.partition(":")
-        return getattr(importlib.import_module(f"{self.package}.{module}"), name)
+        return getattr(import_module(f".{module}", __package__), name)
 
     def __call__(self, **options: Any) -> Solver:
         """Return a new solver."""
-        module = importlib.import_module(f"{self.package}.solver")
-        return getattr(module, self.solver)(**options)
+        return getattr(self._module, self.solver.partition(":")[2])(**options)
+
+    @property
+    def _module(self) -> Any:
+        """Return the module of the solver."""
+        return import_module(f".{self.solver.partition(':')[0]}", __package__)
 
     @property
     def program(self) -> Override | None:
@@ -216,5 +216,4 @@ class SolverOffer:
 
     def diagnose(self, named: Path | str | None = None) -> list[Diagnosis]:
         """Diagnose every installation of it on this machine, each on the bars."""
-        module = importlib.import_module(f"{self.package}.solver")
-        return module.diagnose(named)
+        return self._module.diagnose(named)

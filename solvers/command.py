@@ -8,13 +8,13 @@ from typing import Annotated
 
 from pydantic import Field
 
-from ...errors import SolverFailure
-from ...materials.law import HypoelasticLaw
-from ..base import Diagnosis, History, SolverCheck
-from ..decks import UserDeck
-from ..process import Outcome, disk_full, log_tail, run_process
-from ..scratch import run_folder, write_deck
-from ..settings import ExternalSettings
+from ..errors import SolverFailure
+from ..materials.law import HypoelasticLaw
+from .base import Diagnosis, History, SolverCheck
+from .decks import UserDeck
+from .process import Outcome, disk_full, log_tail, run_process
+from .scratch import run_folder, write_deck
+from .settings import ExternalSettings
 
 LOG = "deck.log"
 TIMEOUT_S = 3600.0

@@ -1,4 +1,4 @@
-"""solvers/command/solver.py: commands in scratch folders, and how they end."""
+"""solvers/command.py: commands in scratch folders, and how they end."""
 
 import sys
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.solvers.base import History
-from bubblefit.solvers.command.solver import CommandSolver
+from bubblefit.solvers.command import CommandSolver
 from bubblefit.solvers.decks import UserDeck
 from bubblefit.solvers.registry import SOLVERS, diagnose, solver_named
 
-from ...support.refusals import raised
+from ..support.refusals import raised
 
 
 @dataclass(frozen=True)
