@@ -250,7 +250,7 @@ def _outline_residual(
     """
     residuals = []
     for points, rise in surfaces:
-        orthogonal, _ = np.linalg.qr(terms(points, outline))
+        orthogonal, _ = scipy.linalg.qr(terms(points, outline), mode="economic", check_finite=False)
         residuals.append(rise - orthogonal @ (orthogonal.T @ rise))
     return np.concatenate(residuals)
 
@@ -299,8 +299,11 @@ def _terms(local: Array, is_clamped: bool = False) -> Array:
     factor = 1.0 - u**2 - v**2
     if is_clamped:
         factor = factor.clip(min=0.0)
-    shapes = [factor * u**i * v**j for i, j in (*EVEN, *ODD)]
-    return np.stack([*shapes, np.ones_like(u)], axis=1)
+    powers = [np.ones_like(local)]
+    while len(powers) <= max(EVEN[-1]):
+        powers.append(powers[-1] * local)
+    shapes = [factor * powers[i][0] * powers[j][1] for i, j in (*EVEN, *ODD)]
+    return np.array([*shapes, powers[0][0]]).T
 
 
 def _in_semi_axes(
