@@ -27,8 +27,8 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .experiments.cycles.evaluation import cycles
-    from .experiments.fabric import Fabric
     from .experiments.own import OwnTest
+    from .experiments.sections import Fabric
     from .materials.card import MaterialCard, read_card
     from .materials.forms.spline import Form
     from .notes import BubblefitWarning
@@ -90,7 +90,7 @@ __all__ = [
 #: is quick.
 _NAMES = {
     "experiments.cycles.evaluation": "cycles",
-    "experiments.fabric": "Fabric",
+    "experiments.sections": "Fabric",
     "experiments.own": "OwnTest",
     "materials.card": "MaterialCard read_card",
     "materials.forms.spline": "Form",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.bubble.symmetry import mirrored
+from bubblefit.experiments.bubble.field_shape import mirrored
 from bubblefit.inference.reported import moduli_error, reported_moduli
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.certainty import with_certainty

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import Weighting
-from bubblefit.experiments.planning import Candidate, Planning
+from bubblefit.experiments.base import Candidate, Planning, Weighting
 from bubblefit.experiments.registry import kinds
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.linear import PRIOR, information_of

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import BubblefitError
-from bubblefit.experiments.cycles.doubts import SLIP
-from bubblefit.experiments.cycles.evaluation import evaluate_history
+from bubblefit.experiments.cycles.evaluation import SLIP, evaluate_history
 from bubblefit.experiments.cycles.values import lower_end
 from bubblefit.readers.histories import find_cycles, read_history
 from common import SHARED, start_on

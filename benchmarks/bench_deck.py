@@ -8,7 +8,7 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 import scipy.optimize
-from bubblefit.experiments.deck.differences import ANY_LAW
+from bubblefit.experiments.deck.solvers import ANY_LAW
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.storage.writing import cache_folder
 

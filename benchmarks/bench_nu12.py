@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.biaxial.planning import candidates as biaxial_candidates
+from bubblefit.experiments.base import Planning
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
+from bubblefit.experiments.biaxial.prepared import candidates as biaxial_candidates
 from bubblefit.experiments.bubble.prepared import PreparedBubble
-from bubblefit.experiments.planning import Planning
-from bubblefit.experiments.strips.planning import candidates
+from bubblefit.experiments.strips.prepared import candidates
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.inference.nuisance_fit import verdicts

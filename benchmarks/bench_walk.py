@@ -11,12 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bubblefit as bf
-from bubblefit.runs.best import best_fit
 from bubblefit.runs.certainty import with_certainty
 from bubblefit.runs.folder import Provenance
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
-from bubblefit.runs.starts import run_start
+from bubblefit.runs.starts import best_fit, run_start
 from common import EXAMPLES, start_on
 
 ROOT = Path(bf.__file__).resolve().parent

@@ -8,14 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.experiments.bubble import BubbleTest
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.runs.best import best_fit
 from bubblefit.runs.certainty import with_certainty
 from bubblefit.runs.setup import prepare_fit
-from bubblefit.runs.starts import StartRecord
+from bubblefit.runs.starts import StartRecord, best_fit
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))  # no installed package has the tests

@@ -11,14 +11,17 @@ import click
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..experiments.biaxial.evaluation import evaluate_test
-from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
+from ..experiments.biaxial import BiaxialTest
+from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.paths import canonical_ratio
 from ..experiments.biaxial.prepared import PreparedBiaxial
-from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.cycles.evaluation import cycles
-from ..experiments.strips.gauge import GaugeTable, virtual_strain_gauge
-from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
+from ..experiments.strips.gauge import (
+    GaugeTable,
+    PairedLoads,
+    loads_at_frames,
+    virtual_strain_gauge,
+)
 from ..lazy_modules import pandas as pd
 from ..materials.designers import Options
 from ..notes import note_lines

@@ -140,7 +140,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     """
     from ..project.schema import usual_folder
     from ..runs.fit import fit
-    from ..runs.log import timed
+    from ..runs.progress import timed
 
     path: Path = options["project"]
     project = with_fit_options(common.read_with_solver(options), options)
@@ -235,7 +235,7 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     from ..inference.reported import BOUND_WORDS, LEVEL
     from ..materials.forms.symmetry import modulus_labels
     from ..reports.html import percent
-    from ..runs.answers import answers
+    from ..runs.verdict import answers
 
     certainty = fit.best.certainty
     is_of_noise = certainty is not None and certainty.mesh is None

@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from ..errors import InputError, OutputError, Problems, SolverFailure, check_one_of
-from ..experiments.bubble.test import BubbleTest
+from ..experiments.bubble import BubbleTest
 from ..experiments.deck.input_file import InputDeck
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names

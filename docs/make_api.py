@@ -27,7 +27,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
         ("project.objects:Bubble,Strips,Biaxial,Cylinder,Deck,Sheet,Registration,Law",
-         "project.measured:read,register,Registered", "experiments.fabric:Fabric",
+         "project.measured:read,register,Registered", "experiments.sections:Fabric",
          "project.project:read_project,Project", "runs.fit:fit", "runs.check:check",
          "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
@@ -49,7 +49,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "runs.estimate:estimate"),
     ),
     "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.base",
-                                "experiments.predicted", "experiments.presenter",
+                                "experiments.predicted",
                                 "experiments.registry",
                                 "inference.comparison:Comparison",
                                 "inference.objective:Objective")),

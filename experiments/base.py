@@ -1,10 +1,10 @@
-"""The protocols of a kind of test, of its tests, and of tests prepared with their data.
+"""The protocols of a kind of test: its tests, these prepared with their data, plans and presenters.
 
 A project names tests; each is of a kind. A kind reads its section of the project into a `Test`,
 which makes models. Tests of a kind that can be fitted are prepared once (their data are read, or
 computed) and then give comparisons of model and data to a fit, in every process that runs a start
-of it; the kind's presenter says what a fit means for a test. Nothing outside the folder of a kind
-in this package asks which kind a test is.
+of it; the kind's presenter says what a fit means for a test. A plan proposes candidates for the
+next test. Nothing outside the folder of a kind in this package asks which kind a test is.
 """
 
 from __future__ import annotations
@@ -16,21 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
+from ..notes import Note, NoteKind, Objection
+from ..solvers.base import Array, History
 from .cap import CapEstimate
-from .forward import Studied
+from .forward import Cards, Runs, Simulation, Studied
 from .predicted import Predicted
 from .sections import Place, Scales
 
 if TYPE_CHECKING:
+    from ..inference.assessment import Certainty
     from ..inference.comparison import Comparison
     from ..materials.card import MaterialCard, State
     from ..materials.law import HypoelasticLaw
-    from ..notes import Note, NoteKind
     from ..readers.histories import Pace
     from ..solvers.base import Solver
-    from .data_files import DataFile
+    from .data_files import DataFile, Output
     from .doubts import Doubt, Expected
+
 
 #: Makes a new solver, so that no two models share what it prepares for its model: the solver of
 #: the project, or another by its name, with the settings that the project has for it.
@@ -503,3 +507,229 @@ class Kind(BaseKind, Protocol):
         SolverFailure
             The known solution cannot be computed.
         """
+
+
+UNMATCHED = NoteKind("unmatched direction", weight=9)
+DIRECTIONS_MISSED = NoteKind(
+    "directions missed",
+    weight=16,
+    objection=Objection(
+        "the law cannot follow the directions of the strips",
+        'try form = "spline-ratio" in [law], or do not use the law at an angle to the yarns',
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTest:
+    """One test with the results of a finished fit.
+
+    Parameters
+    ----------
+    comparisons : tuple of Comparison
+        The test's comparisons of model and data, in its order, weighted by `Weighting()`.
+    histories : tuple of History
+        The response of each comparison's model with the best law.
+    nuisance : mapping of str to float
+        Values of the test's nuisance unknowns by their plain names, each in its unit.
+    law : HypoelasticLaw
+        The law that was identified.
+    laws : sequence of HypoelasticLaw
+        The laws found from the best starts of the fit, best first.
+    reached : (3,) array
+        Largest strains (eps1, eps2, gamma12) in all tests of the fit.
+    valid : (3,) array
+        Largest strains up to which the moduli are identified.
+    certainty : Certainty, optional
+        The uncertainty of the law, where it was assessed.
+    compared_with : sequence of str
+        Names of all comparisons of the fit, those of its other tests included.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    histories: tuple[History, ...]
+    nuisance: Mapping[str, float]
+    law: HypoelasticLaw
+    laws: Sequence[HypoelasticLaw]
+    reached: Array
+    valid: Array
+    certainty: Certainty | None
+    compared_with: Sequence[str] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Hold what a finished fit means for one test, in numbers and words.
+
+    Parameters
+    ----------
+    numbers : dict
+        Entries of result.json.
+    warnings : tuple of Note
+        Why the result may not be believed.
+    lines : tuple of str
+        Lines for the terminal.
+    quality : str
+        The quality of the fit in a few words, for the material card.
+    summary : str
+        A clause for the head of the page of the report.
+    """
+
+    numbers: dict[str, Any]
+    warnings: tuple[Note, ...] = ()
+    lines: tuple[str, ...] = ()
+    quality: str = ""
+    summary: str = ""
+
+
+class Presenter(Protocol):
+    """Describe what runs need of a kind's presenter; `reports` needs further members."""
+
+    def findings(self, prepared: Any, fitted: FittedTest) -> Findings:
+        """Return what a finished fit means for a test: numbers, warnings and words.
+
+        Parameters
+        ----------
+        prepared : PreparedTest
+            The test with its data.
+        fitted : FittedTest
+            What the fit made of it.
+        """
+
+    def residuals(self, prepared: Any, fitted: FittedTest) -> pd.DataFrame:
+        """Return the table of residuals, with a row for each matched value.
+
+        Returns
+        -------
+        DataFrame
+            Columns: part, columns that say where the value is, then quantity, measured, modelled,
+            difference and unit.
+        """
+
+    def simulate(
+        self,
+        test: Any,
+        cards: Cards,
+        runs: Runs,
+        out: Output,
+        within_range: bool = False,
+    ) -> Simulation:
+        """Write files and figures of a test's forward analyses, and return their results.
+
+        Parameters
+        ----------
+        test : Test
+            The test that was run.
+        cards : mapping of str to MaterialCard
+            The cards by name.
+        runs : mapping of (str, str) to CardRun
+            The analyses by (name of the card, name of the part of the test).
+        out : Output
+            Where files are written.
+        within_range : bool
+            Whether curves are shown only up to the end of a card's valid range of strain.
+        """
+
+
+#: Largest logarithmic strain to which a test is planned, also where the law has no limit.
+LARGEST_STRAIN = 0.3
+
+
+@dataclass(frozen=True)
+class Precision:
+    """The precision of the measured values of one comparison of the project.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of one value that the fit assumes, in the unit of the data.
+    correlated_count : float
+        Number of neighbouring values whose errors are as good as equal.
+    value_count : int
+        Number of values of one block: a component of displacement in one frame, or a load curve.
+    """
+
+    noise: float
+    correlated_count: float
+    value_count: int
+
+    def for_values(self, value_count: int) -> float:
+        """Return the noise at which `value_count` independent values are as precise as the block.
+
+        It is noise * sqrt(correlated_count * value_count / self.value_count).
+        """
+        return self.noise * float(np.sqrt(self.correlated_count * value_count / self.value_count))
+
+
+@dataclass(frozen=True, eq=False)
+class Planning:
+    """Hold what is known of a project when a test of one kind is planned.
+
+    Parameters
+    ----------
+    place : Place
+        Place of the planned test, with the fabric and the units.
+    present : sequence of PreparedTest
+        The project's tests of the kind, with their data.
+    precision : mapping of str to Precision
+        The precision of the project's data, by name of the comparison.
+    law : HypoelasticLaw
+        The law at the present optimum, with which the data of candidates are computed.
+    make_solver : callable
+        Makes the solver that computes them.
+    noise : float, optional
+        Standard deviation of one measured value of the kind (mm, N), where a user gives it.
+    """
+
+    place: Place
+    present: Sequence[PreparedTest]
+    precision: Mapping[str, Precision]
+    law: HypoelasticLaw
+    make_solver: MakeSolver
+    noise: float | None = None
+
+    def noise_is(self, template: PreparedTest | None = None) -> str:
+        """Return where the noise of a candidate that is like `template` is from, in words."""
+        if self.noise is not None:
+            return "given"
+        return "assumed" if template is None else f"that of {template.test.name}"
+
+    @property
+    def ends(self) -> Array:
+        """Return the largest strains (3,) worth testing: the law's, up to `LARGEST_STRAIN`.
+
+        They are in the order (eps1, eps2, gamma12).
+        """
+        return np.minimum(self.law.strain_range, LARGEST_STRAIN)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A test that could be made next.
+
+    Parameters
+    ----------
+    name : str
+        What the test is, in a few words; no two candidates have the same name.
+    make : callable
+        Returns the test prepared with data computed with the law; the noise of its objective is
+        that of independent values. Raises SolverFailure where the law cannot be run, InputError
+        where there is no such model.
+    noise_is : str
+        Where that noise is from, in words.
+    specimens : int
+        Number of specimens that are usually tested, all with the same information.
+    """
+
+    name: str
+    make: Callable[[], PreparedTest]
+    noise_is: str
+    specimens: int = 1
+
+
+@runtime_checkable
+class Plannable(Protocol):
+    """A kind of test that proposes candidates for the next test."""
+
+    def candidates(self, planning: Planning) -> Sequence[Candidate]:
+        """Return the tests of the kind that a plan is to compare."""

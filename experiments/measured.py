@@ -18,9 +18,17 @@ from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
-from .base import BaseKind, BasePrepared, MakeSolver, Masks, PreparedTest, Reach, Weighting
+from .base import (
+    BaseKind,
+    BasePrepared,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    PreparedTest,
+    Reach,
+    Weighting,
+)
 from .data_files import DataFile
-from .fitted import FittedTest
 from .forward import Runs
 
 PERCENT = 100.0

@@ -10,7 +10,8 @@ from typing import Any, cast
 
 from ..errors import InputError, PlugInFailure
 from ..plugins import Group, names_with_plug_ins, plug_in_named
-from .base import BaseKind, Kind
+from ..presenting import KINDS
+from .base import BaseKind, Kind, Presenter
 from .own import KIND as OWN
 
 GROUP: Group = "bubblefit.tests"
@@ -64,6 +65,20 @@ def kind_named(name: str) -> Kind:
         raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
     kind = plug_in.load("kind of test", NEEDED)
     return kind if BaseKind in type(kind).mro() else cast(Kind, PlugInKind(kind))
+
+
+def presenter_of(name: str) -> Presenter:
+    """Return the presenter of a kind of test: its own `report`, else the one of its class.
+
+    Raises
+    ------
+    InputError
+        There is no kind of this name.
+    PlugInFailure
+        The kind is one of a plug-in that does not work.
+    """
+    kind = kind_named(name)
+    return cast(Presenter, KINDS.of(kind) if kind.report is None else kind.report)
 
 
 class PlugInKind(BaseKind):

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -27,7 +27,30 @@ from ..readers.sections import (
     values_that_were_set,
 )
 from ..storage.reading import is_file, missing_file_reason
-from .fabric import Fabric
+
+if TYPE_CHECKING:
+    from ..materials.law import ThicknessChange
+
+
+@dataclass(frozen=True)
+class Fabric:
+    """The one fabric that all tests of a project are made of.
+
+    Attributes
+    ----------
+    name : str
+    thickness : float, mm
+        Thickness before the test.
+    thickness_change : str
+        How the law lets the thickness change with strain.
+    lab : str
+        Who tested the fabric, for the page of a report.
+    """
+
+    name: str
+    thickness: float
+    thickness_change: ThicknessChange = "constant"
+    lab: str = ""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..experiments.biaxial.tables import read_biaxial_table
+from ..experiments.biaxial.paths import read_biaxial_table
 from ..readers.bending import read_bending_curves
 from ..readers.curves import (
     DIRECTION_OF_ANGLE,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, check_one_of
-from ..experiments.biaxial.tables import read_biaxial_table
+from ..experiments.biaxial.paths import read_biaxial_table
 from ..experiments.bubble.findings import registration_line, registration_numbers
 from ..experiments.bubble.prepared import read_measured
 from ..experiments.bubble.registration import CameraRegistration
-from ..experiments.fabric import Fabric
+from ..experiments.sections import Fabric
 from ..lazy_modules import pandas as pd
 from ..readers.bending import read_bending_curves
 from ..readers.curves import read_load_curves

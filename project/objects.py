@@ -24,9 +24,8 @@ from pydantic import BaseModel, ValidationError
 from ..errors import InputError
 from ..experiments.bubble.section import RegistrationSection, SheetSection
 from ..experiments.data_files import Output, arrays_checksum
-from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
-from ..experiments.sections import ObjectPlace, Scales, argument_of
+from ..experiments.sections import Fabric, ObjectPlace, Scales, argument_of
 from ..light_dataclasses import dataclass
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..materials.forms.symmetry import MODULI

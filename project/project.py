@@ -16,10 +16,9 @@ from pydantic import ValidationError
 from ..arguments import checked_arguments
 from ..errors import InputError, Problems, check_one_of
 from ..experiments.base import Test
-from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
-from ..experiments.sections import Place, Scales
+from ..experiments.sections import Fabric, Place, Scales
 from ..inference.methods import method_named, method_names
 from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard, read_card, read_parameters

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
 from ..experiments.data_files import Output
-from ..experiments.run_records import by_strain
+from ..experiments.forward import by_strain
 from ..inference.assessment import Certainty
 from ..inference.linear import PRIOR
 from ..inference.reported import (
@@ -34,7 +34,6 @@ from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
 from ..project.schema import FITTED_CARD, PARAMETERS
-from ..runs.answers import Answer, answers
 from ..runs.fit_folder import HISTORY
 from ..runs.folder import (
     RESULT,
@@ -43,7 +42,7 @@ from ..runs.folder import (
     write_table,
 )
 from ..runs.result import Fit
-from ..runs.verdict import LEAST_STRAIN, SPACE
+from ..runs.verdict import LEAST_STRAIN, SPACE, Answer, answers
 from ..storage.writing import write_text
 from ..wording import percent
 from .charts import (

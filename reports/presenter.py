@@ -9,11 +9,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from ..experiments.base import PreparedTest
+from ..experiments.base import Findings, FittedTest, PreparedTest, Presenter
 from ..experiments.data_files import Output
-from ..experiments.fitted import Findings, FittedTest
 from ..experiments.forward import Cards, Runs, Simulation
-from ..experiments.presenter import Presenter, presenter_of
+from ..experiments.registry import presenter_of
 from ..lazy_modules import pandas as pd
 from .charts import Chart, Charts, dots, line
 from .content import Exhibit

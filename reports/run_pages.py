@@ -23,12 +23,12 @@ from ..inference.reported import BOUND_WORDS, LEVEL
 from ..lazy_modules import pandas as pd
 from ..notes import Verdict, as_note, note_records, write_notes
 from ..project.project import Project
-from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
 from ..runs.fit_folder import HISTORY, STARTS, RunningFiles
 from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, versions, write_table
 from ..runs.predictions import Predictions
 from ..runs.simulation import SimulatedTests
+from ..runs.verdict import answers
 from ..runs.verification import Verification
 from ..storage.writing import json_text, write_text
 from ..version import __version__

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..experiments.base import PreparedTest
 from ..experiments.data_files import Output
 from ..experiments.forward import CardRun
-from ..experiments.presenter import presenter_of
+from ..experiments.registry import presenter_of
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL, sigma_words
 from ..lazy_modules import pandas as pd

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import NotNegative, TwoOrMore, checked_arguments
 from ..errors import InputError
-from ..experiments.run_records import by_strain
+from ..experiments.forward import by_strain
 from ..inference.descent import DescentSettings, descend
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus, moduli_of, sigma_words

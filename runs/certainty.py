@@ -35,8 +35,8 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, Objection
-from .best import BestFit
 from .setup import FitSetup, with_shared
+from .starts import BestFit
 
 MESH = NoteKind(
     "mesh error",

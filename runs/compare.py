@@ -23,7 +23,6 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, Verdict
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
-from .best import noise_of
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, finished, shown
 from .held_out import errors
@@ -34,6 +33,7 @@ from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, coarse_problem, fingerprints, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study, check_has_law
+from .starts import noise_of
 
 FOLD = NoteKind("fold without an error")
 VALIDATION = "validation.json"

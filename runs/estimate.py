@@ -24,9 +24,9 @@ from ..notes import Note, NoteKind, note_records
 from ..processes import one_blas_thread
 from ..project.project import Project
 from ..version import __version__
-from .answers import answer_numbers
-from .best import BestFit, reached_by
 from .setup import FitSetup, prepare_fit
+from .starts import BestFit, reached_by
+from .verdict import answer_numbers
 
 log = logging.getLogger(__name__)
 

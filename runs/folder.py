@@ -28,7 +28,7 @@ import numpy as np
 from ..arguments import checked_arguments
 from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.base import PreparedTest, Test
-from ..experiments.run_records import RunRecord
+from ..experiments.forward import RunRecord
 from ..lazy_modules import pandas as pd
 from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..presenting import DRAWINGS, PAGES

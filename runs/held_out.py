@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from ..experiments.base import MakeSolver, Masks, PreparedTest, Weighting
-from ..experiments.fitted import FittedTest
-from ..experiments.presenter import presenter_of
-from ..experiments.run_records import notes_beyond, strains_of, unstable_words
+from ..experiments.base import FittedTest, MakeSolver, Masks, PreparedTest, Weighting
+from ..experiments.forward import notes_beyond, strains_of, unstable_words
+from ..experiments.registry import presenter_of
 from ..inference.noise import misfits
 from ..inference.nuisance_fit import fit_nuisance, problem_at
 from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
-from .best import reached_by
 from .simulation import FAILED
+from .starts import reached_by
 from .verdict import NOT_CONVERGED
 
 NUISANCE_NOT_CONVERGED = (

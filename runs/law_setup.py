@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..experiments.base import Reach
-from ..experiments.run_records import STRAINS
+from ..experiments.forward import STRAINS
 from ..inference.nuisance import Nuisance
 from ..inference.unknowns import LawBounds
 from ..materials.forms.base import (

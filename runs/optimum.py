@@ -21,11 +21,10 @@ from ..notes import SOLVER, Note, NoteKind
 from ..project.project import Project
 from ..solvers.registry import SURROGATE
 from ..wording import distinct_numbers
-from .best import BestFit, best_fit
 from .certainty import with_certainty
 from .setup import FitSetup, make_solver, prepare_fit
 from .simulation import GivenCard, card_of, card_words
-from .starts import StartRecord
+from .starts import BestFit, StartRecord, best_fit
 
 #: Relative excess over a bound that is allowed, as the numbers in cards are rounded.
 ROUNDING = 1e-4

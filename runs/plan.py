@@ -11,10 +11,8 @@ import numpy as np
 
 from ..arguments import Positive, checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
-from ..experiments.base import MakeSolver, Weighting
-from ..experiments.planning import Candidate, Plannable, Planning, Precision
-from ..experiments.registry import kinds
-from ..experiments.run_records import (
+from ..experiments.base import Candidate, MakeSolver, Plannable, Planning, Precision, Weighting
+from ..experiments.forward import (
     BEYOND_LAW,
     by_strain,
     notes_beyond,
@@ -22,6 +20,7 @@ from ..experiments.run_records import (
     strains_of,
     unstable_words,
 )
+from ..experiments.registry import kinds
 from ..experiments.sections import Place
 from ..inference.linear import information_of
 from ..inference.posterior import Posterior

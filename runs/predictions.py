@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -14,10 +15,16 @@ from typing import Any
 from ..arguments import NotNegative, Positive, checked_arguments
 from ..errors import InputError, SolverFailure
 from ..experiments.base import Test
-from ..experiments.predicted import Predicted, PredictedOutcome, PredictedRun, band_of, record_of
+from ..experiments.forward import RunRecord, notes_of, other_thickness
+from ..experiments.predicted import (
+    Predicted,
+    PredictedOutcome,
+    PredictedRun,
+    band_of,
+    laws_around,
+    record_of,
+)
 from ..experiments.registry import kind_named
-from ..experiments.run_records import RunRecord, notes_of, other_thickness
-from ..experiments.sampling import laws_around
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
@@ -39,11 +46,12 @@ from .folder import (
     versions,
 )
 from .in_use import alone_in_folder
-from .log import log_run
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
 from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
+
+log = logging.getLogger(__name__)
 
 
 def predicted_kind(name: str) -> Predicted:
@@ -573,7 +581,9 @@ class RunSeries:
         thickness_notes = other_thickness(run.material, self._project.fabric.thickness)
         run = replace(run, record=record, notes=[*notes, *thickness_notes])
         self._ended[number] = run
-        log_run(run.title, record, from_folder)
+        end = record.failure or (f"stopped early, {record.early}" if record.early else "finished")
+        origin = ", kept from before" if from_folder else ""
+        log.info("%s: %s; %.2f s%s", run.title, end, record.seconds, origin)
         self._on_event(RunEvent(run, len(self._ended), len(runs), from_folder))
 
 

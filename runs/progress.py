@@ -1,8 +1,10 @@
-"""Display of progress by a callback, a bar in a notebook or lines; `Count` counts for all."""
+"""Progress of runs: shown by a callback, a bar in a notebook or lines (`Count`), and logged."""
 
+import logging
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from html import escape
 from typing import Any
 
@@ -186,3 +188,11 @@ class ProgressBar(Count):
             self._handle = display.display(formats, raw=True, display_id=True)
         else:
             self._handle.update(formats, raw=True)
+
+
+@contextmanager
+def timed(part: str) -> Iterator[None]:
+    """Log the seconds of a part of a command."""
+    start_time = time.perf_counter()
+    yield
+    logging.getLogger(__name__).info("%s: %.2f s", part, time.perf_counter() - start_time)

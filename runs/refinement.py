@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..arguments import NotNegative, TwoOrMore, checked_arguments
 from ..errors import InputError, SolverFailure
 from ..experiments.base import Refined, Test
-from ..experiments.run_records import notes_of, other_thickness
+from ..experiments.forward import notes_of, other_thickness
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import Array

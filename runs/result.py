@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import NotNegative, checked_arguments
 from ..errors import InputError, check_one_of
+from ..experiments.base import Findings, FittedTest
 from ..experiments.doubts import Judgement
-from ..experiments.fitted import Findings, FittedTest
-from ..experiments.presenter import presenter_of
-from ..experiments.run_records import (
+from ..experiments.forward import (
     BEYOND_LAW,
     BEYOND_LAW_WORDS,
     by_strain,
@@ -24,6 +23,7 @@ from ..experiments.run_records import (
     strains_of,
     unstable_words,
 )
+from ..experiments.registry import presenter_of
 from ..experiments.states import notes_of_states, state_of
 from ..inference.assessment import (
     Certainty,
@@ -53,14 +53,20 @@ from ..project.project import Project
 from ..storage.writing import plain_values
 from ..version import __version__
 from ..wording import html_table
-from .answers import answer_numbers, answers
-from .best import BestFit
 from .certainty import CORRECTED, REPORTED, card_certainty
 from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_table
 from .held_out import HeldOut, held_out, nuisance_of
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
-from .verdict import NOT_CONVERGED, FitVerdict, verdict_of, verdict_of_parameters
+from .starts import BestFit
+from .verdict import (
+    NOT_CONVERGED,
+    FitVerdict,
+    answer_numbers,
+    answers,
+    verdict_of,
+    verdict_of_parameters,
+)
 
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)

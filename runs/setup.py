@@ -27,7 +27,7 @@ from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import SURROGATE, solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .law_setup import bounds_of, law_of, shared_unknowns
-from .log import timed
+from .progress import timed
 from .starts import StartRecord
 
 #: Keys of [fit] that do not change the result of a start. The solver does, and is compared by its

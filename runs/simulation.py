@@ -12,11 +12,9 @@ from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import ProgramTest, Refined, Test
 from ..experiments.data_files import Output
-from ..experiments.fabric import Fabric
-from ..experiments.forward import CardRun, Simulation, Studied
-from ..experiments.presenter import presenter_of
-from ..experiments.registry import kind_named
-from ..experiments.run_records import notes_of, other_thickness
+from ..experiments.forward import CardRun, Simulation, Studied, notes_of, other_thickness
+from ..experiments.registry import kind_named, presenter_of
+from ..experiments.sections import Fabric
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, Verdict, marks_of, note_lines, note_records
@@ -31,9 +29,8 @@ from ..wording import percent
 from .executor import executor_of
 from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Reported, Store, draw
 from .in_use import alone_in_folder
-from .log import timed
 from .process_pool import Task
-from .progress import Listener, listener
+from .progress import Listener, listener, timed
 from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
 
 #: The kind of a note on a run that has no result.

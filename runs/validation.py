@@ -24,7 +24,6 @@ from ..materials.card import MaterialCard, thickness_difference
 from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project, chosen_cards
 from ..version import __version__
-from .best import reached_by
 from .compare import candidates, fit_of, folder_name, law_of_masked_data
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, check_unused, finished, shown
@@ -36,6 +35,7 @@ from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
 from .simulation import StudyRecord, begin_study
+from .starts import reached_by
 from .verdict import large_errors, state_of_predictions
 
 STARTS = 3

@@ -13,9 +13,7 @@ NOT_THE_PRODUCT = {"tests", "benchmarks", "docs", "examples", "out", "build", "d
 #: Modules of more lines than this have a test file of their name.
 MAX_LINES = 100
 #: Modules that have none, and the tests that specify them instead.
-REASONS = {
-    "experiments/bubble/loaded_reference.py": "tests/runs/test_alternatives.py asks for it",
-}
+REASONS = {}
 
 
 def test_file_of(module: Path) -> Path:

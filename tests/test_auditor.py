@@ -22,7 +22,7 @@ from .builders.biaxial_tests import (
 )
 from .builders.load_histories import load_history, write_history
 from .builders.projects import computed_bubble_fields, constant_strips, known_bubble
-from .experiments.tube.test_test import project as tube_project
+from .experiments.test_tube import project as tube_project
 from .support.commands import in_process
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.

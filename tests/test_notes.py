@@ -14,19 +14,19 @@ from typing import NamedTuple
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
+from bubblefit.experiments.base import DIRECTIONS_MISSED, UNMATCHED
 from bubblefit.experiments.bubble.findings import (
     FLAT_SHEET,
     INVERSE_CRIME,
     NEGATIVE_SLACK,
     SURFACES,
 )
-from bubblefit.experiments.bubble.loaded_reference import LOADED_REFERENCE
-from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
+from bubblefit.experiments.bubble.frame_doubts import LOADED_REFERENCE
+from bubblefit.experiments.cycles.evaluation import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
-from bubblefit.experiments.fitted import DIRECTIONS_MISSED, UNMATCHED
-from bubblefit.experiments.presenter import presenter_of
-from bubblefit.experiments.run_records import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
+from bubblefit.experiments.forward import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
+from bubblefit.experiments.registry import presenter_of
 from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strips.gauge import CORRELATION_LOST, NO_LOAD
 from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE
@@ -52,11 +52,11 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.reports.kinds.bubble_readings import TAKEN_FOR_FLAT
 from bubblefit.reports.kinds.strips import LEFT_OUT, POISSON
-from bubblefit.runs.alternatives import NOT_BETTER
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.certainty import MESH, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.compare import FOLD
 from bubblefit.runs.estimate import GAP, NOT_ESTIMATED
+from bubblefit.runs.fit import NOT_BETTER
 from bubblefit.runs.optimum import NOT_THE_CARD
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED

@@ -72,7 +72,7 @@ def faults(source):
 ALLOWED = {
     "examples/solver-adapter/bubblefit_homogeneous.py": ["calls np.loadtxt"],
     "readers/text_frames.py": ["calls np.loadtxt"],
-    "runs/cluster.py": ["imports cloudpickle"],
+    "runs/executor.py": ["imports cloudpickle"],
     "runs/process_pool.py": ["imports cloudpickle"],
 }
 

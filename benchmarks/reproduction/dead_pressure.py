@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.experiments.bubble import BubbleTest, KnownSolution
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.project.project import read_project

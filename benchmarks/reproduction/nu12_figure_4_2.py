@@ -12,7 +12,7 @@ import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.refinement import vary_nu12
-from bubblefit.runs.verification.thesis_bubble import FIGURE_4_2
+from bubblefit.runs.verification.bubbles import FIGURE_4_2
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
 #: "Plus or minus three percent".

@@ -1,26 +1,33 @@
-"""Compare a biaxial test with its model in a fit: residuals, comparisons and data files."""
+"""Biaxial tests ready to be compared with their model, with measured data or proposed by a plan.
 
-from collections.abc import Mapping, Sequence
+Doubts are about units, ratios, moduli and swapped yarns. A plan proposes one load ratio at a time.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import SolverFailure
 from ...inference.comparison import Comparison, ErrorColumns
 from ...inference.nuisance import Nuisance, prior_weight
+from ...materials.biaxial_patch import biaxial_response, largest_load
+from ...materials.designers import RATIOS, shares
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...readers.biaxial import BiaxialTable
+from ...readers.frames import FrameSource
 from ...solvers.base import Array, History
-from ..base import MakeSolver, Masks, Reach, Weighting
+from ..base import Candidate, MakeSolver, Masks, Planning, Precision, Reach, Weighting
 from ..data_files import DataFile
 from ..doubts import Doubt, Expected
-from ..measured import PreparedParts, StrainObjective
-from .doubts import doubts_of_paths
-from .paths import BiaxialPath
-from .test import BiaxialTest, reach_of
+from ..measured import PERCENT, USUAL_NOISE, PreparedParts, StrainObjective
+from . import BiaxialSection, BiaxialTest, TablesSection, reach_of
+from .paths import BiaxialPath, LoadCycle, nearest_ratio
 
 NO_SHARE = (
     "all of the measured load is taken to reach the field where strains are measured; arms and "
@@ -209,3 +216,209 @@ def load_share_nuisance(test: BiaxialTest, objective: PathObjective) -> tuple[Nu
             shared=True,
         ),
     )
+
+
+@dataclass(frozen=True)
+class PathLimits:
+    """Limits beyond which a load path is doubtful for a coated fabric."""
+
+    end_strain: tuple[float, float] = (5e-4, 0.5)  # least and largest strain of a coated fabric
+    load: tuple[float, float] = (0.05, 500.0)  # kN/m, least and largest load of a path
+    angle: float = 6.0  # degrees between the loads' direction and that of their stated ratio
+    stiffer: float = 1.15  # strain across over strain along the more loaded yarn: swapped beyond
+
+
+PATH_LIMITS = PathLimits()
+
+
+def doubts_of_paths(
+    paths: Sequence[BiaxialPath], thickness: float, expected: Expected
+) -> list[Doubt]:
+    """Return the doubts about the load paths of a test: units, ratios, moduli and swapped yarns.
+
+    Parameters
+    ----------
+    paths : sequence of BiaxialPath
+        Loading branches that are evaluated.
+    thickness : float, mm
+        Thickness of the fabric.
+    expected : Expected
+        Bounds that the project gives the moduli.
+    """
+    doubts = [doubt for path in paths for doubt in _of_path(path)]
+    if expected.moduli:
+        doubts += _of_modulus(paths, thickness, expected)
+    doubts += _of_yarns(paths)
+    if not any(doubt.name == "swapped" for doubt in doubts) and expected.warp_is_stiffer:
+        doubts += _of_stiffer_yarn(paths)
+    return doubts
+
+
+def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
+    """Yield doubts about the units of one path, and about its load ratio."""
+    strain = float(np.abs(path.strain_change).max())
+    load = float(path.load.max())
+    if not PATH_LIMITS.end_strain[0] < strain < PATH_LIMITS.end_strain[1]:
+        text = (
+            f"ratio {path.ratio}: the strain changes by {100 * strain:.3g} % along the path: are "
+            "the strains in the unit that is said?"
+        )
+        yield Doubt("strain-unit", True, text)
+    if not PATH_LIMITS.load[0] < load < PATH_LIMITS.load[1]:
+        text = (
+            f"ratio {path.ratio}: the loads go up to {load:.3g} kN/m: are they per width, and in "
+            "the unit that is said?"
+        )
+        yield Doubt("load-unit", True, text)
+    warp, fill = (path.load[-1] - path.load[0]).tolist()
+    expected_angle = np.degrees(np.arctan2(*shares(path.ratio)[::-1]))
+    if abs(np.degrees(np.arctan2(fill, warp)) - expected_angle) > PATH_LIMITS.angle:
+        measured_ratio = nearest_ratio([warp, fill])
+        text = (
+            f"ratio {path.ratio}: the loads change by {warp:.4g} and {fill:.4g} kN/m along warp "
+            f"and fill, which is {measured_ratio}: are the columns of warp and fill right?"
+        )
+        is_sure = measured_ratio == ":".join(path.ratio.split(":")[::-1])
+        yield Doubt("ratio", is_sure, text)
+
+
+def _of_modulus(
+    paths: Sequence[BiaxialPath], thickness: float, expected: Expected
+) -> Iterator[Doubt]:
+    """Yield the doubt about the first path whose modulus is far outside the bounds."""
+    for path in paths:
+        yarn = int(np.argmax(path.load[-1] - path.load[0]))
+        strain = float(path.strain_change[-1, yarn])
+        if not strain > 0:
+            continue
+        load = float(path.load[-1, yarn] - path.load[0, yarn])
+        unlikely = expected.outside(load / strain / thickness, ["E1", "E2"])
+        if unlikely:
+            text = (
+                f"ratio {path.ratio}: load over strain and thickness is about {unlikely}: "
+                "are loads and strains in the units that are said, and is the thickness right?"
+            )
+            yield Doubt("modulus", True, text)
+            return
+
+
+def _of_yarns(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
+    """Yield the doubt that warp and fill are swapped: the less loaded yarn strains more."""
+    ends = {path.ratio: path.strain_change[-1] for path in paths}
+    for ratio, mirrored_ratio in (("2:1", "1:2"), ("1:0", "0:1")):
+        if ratio not in ends or mirrored_ratio not in ends:
+            continue
+        warp, fill = ends[ratio]
+        mirrored_warp, mirrored_fill = ends[mirrored_ratio]
+        is_fill_longer = fill > PATH_LIMITS.stiffer * warp
+        if is_fill_longer and mirrored_warp > PATH_LIMITS.stiffer * mirrored_fill:
+            text = (
+                f"in ratios {ratio} and {mirrored_ratio} the yarn that is pulled less "
+                "stretches more: the strains of warp and fill seem to be swapped"
+            )
+            yield Doubt("swapped", True, text)
+            return
+
+
+def _of_stiffer_yarn(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
+    """Yield the doubt that warp and fill are swapped, where the bounds have the warp stiffer.
+
+    Equal loads are compared: those of 1:1, or those of a ratio and its mirror image.
+    """
+    compliance = {
+        path.ratio: path.strain_change[-1] / np.maximum(path.load[-1] - path.load[0], 1e-9)
+        for path in paths
+    }
+    for ratio, mirrored_ratio in (("1:1", "1:1"), ("2:1", "1:2"), ("1:0", "0:1")):
+        if ratio not in compliance or mirrored_ratio not in compliance:
+            continue
+        warp = compliance[ratio][0]
+        fill = compliance[mirrored_ratio][1]
+        if warp > PATH_LIMITS.stiffer * fill > 0:
+            text = (
+                f"in {ratio} the warp is strained {warp / fill:.3g} times as much as the fill is "
+                f"by the same load in {mirrored_ratio}, and the bounds have the warp stiffer: warp "
+                "and fill, or their strains alone, seem to be swapped"
+            )
+            yield Doubt("swapped", False, text)
+            return
+
+
+@dataclass(frozen=True)
+class CandidatePaths:
+    """Load paths that a plan proposes."""
+
+    further_ratios: tuple[str, ...] = ("1:5", "5:1")  # beside the five of designers' constants
+    loads: int = 20  # number of loads of a path
+    independent_values: int = 5  # number in a curve if no test says: extensometers drift
+    prestress: float = 0.05  # first load of a path, as a share of its last
+
+
+CANDIDATES = CandidatePaths()
+
+
+def candidates(planning: Planning) -> Sequence[Candidate]:
+    """Return a candidate test for each load ratio, loaded up to the strains of the law's range."""
+    prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
+    noise_is = planning.noise_is(prepared[0] if prepared else None)
+    return [
+        Candidate(f"biaxial {ratio}", partial(_computed, ratio, prepared, planning), noise_is)
+        for ratio in (*RATIOS, *CANDIDATES.further_ratios)
+    ]
+
+
+def _computed(
+    ratio: str, present: Sequence[PreparedBiaxial], planning: Planning
+) -> PreparedBiaxial:
+    """Return a test of one ratio, with the strains that the current law predicts."""
+    thickness = planning.place.fabric.thickness
+    highest = largest_load(planning.law, thickness, [shares(ratio)], planning.ends[:2])
+    if not highest > 0:
+        raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")
+    count = CANDIDATES.loads
+    levels = highest * np.linspace(CANDIDATES.prestress, 1.0, count)
+    loads = np.outer(levels, shares(ratio))
+    strain = biaxial_response(planning.law, loads, thickness).elongation
+    table = BiaxialTable(
+        Path("computed"),
+        loads,
+        strain,
+        None,
+        np.arange(count),
+        FrameSource("computed"),
+        name="computed",
+    )
+    cycle = LoadCycle(
+        ratio=ratio,
+        phase=1,
+        number=1,
+        number_in_file=1,
+        first=0,
+        last=count - 1,
+    )
+    path = BiaxialPath(table, cycle, 1, loads, strain)
+    section = BiaxialSection(data=TablesSection(files=["computed"]))
+    test = BiaxialTest(
+        name=f"biaxial {ratio}",
+        place=planning.place,
+        weight=1.0,
+        section=section,
+        tables=[table],
+        paths=[path],
+        noise=_noise(present, planning) / PERCENT,
+    )
+    return PreparedBiaxial(test)
+
+
+def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
+    """Return the noise (%) that each strain of a path has if all its errors are independent."""
+    if planning.noise is not None:
+        return planning.noise
+    precisions = [
+        planning.precision[prepared.part(path.ratio)]
+        for prepared in present
+        for path in prepared.test.paths
+    ]
+    if not precisions:
+        precisions = [Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATES.independent_values)]
+    return max(precision.for_values(CANDIDATES.loads - 1) for precision in precisions)

@@ -11,8 +11,8 @@ from ...notes import Note, NoteKind, Objection
 from ...readers.clock_offset import ClockOffset
 from ...solvers.base import Array
 from ...wording import distinct_numbers
-from ..fitted import FittedTest
-from .loaded_reference import SMALLEST_SLACK
+from ..base import FittedTest
+from .frame_doubts import SMALLEST_SLACK
 from .objective import FieldObjective
 from .prepared import PreparedBubble
 from .recorded_frames import RecordedFrames

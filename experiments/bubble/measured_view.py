@@ -16,14 +16,70 @@ from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import UNKNOWN, Expected
-from .apex import Apex, apex_of
-from .column_consistency import CentreMotion, ConsistencyLimits, centre_motion
-from .placement import in_all_quarters
+from .field_shape import Apex, Axes, apex_of, symmetry_axes
+from .placement import Rim, RiseSurface, clamp_of_motion, in_all_quarters, rim_of_motion
 from .registration import are_usable
-from .rim import Rim, RiseSurface, clamp_of_motion, rim_of_motion
-from .symmetry import Axes, symmetry_axes
 
-CONSISTENCY = ConsistencyLimits()
+#: Fewest points on the disk to which a motion, or the sheet's bumps, are fitted: four terms.
+MIN_POINTS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class CentreMotion:
+    """Displacements at the centre by a fit of terms that vanish at the rim, and a constant.
+
+    Attributes
+    ----------
+    dome : (3,) array, mm
+        Displacements dx, dy, dz of the centre relative to the rim.
+    gradient : (3, 2) array
+        Derivatives of dx, dy, dz by x and y at the centre.
+    error : float
+        Standard error of an in-plane element of the gradient.
+    """
+
+    dome: Array
+    gradient: Array
+    error: float
+
+    @property
+    def strain(self) -> Array:
+        """Return the Green-Lagrange strain (2, 2) of the centre."""
+        in_plane = self.gradient[:2]
+        return 0.5 * (in_plane + in_plane.T + self.gradient.T @ self.gradient)
+
+    def due_strains(self, outline: Outline) -> tuple[float, float]:
+        """Return the strains 2/3 (h/R)^2 expected from the rise, along long and short semi-axis."""
+        rise = abs(float(self.dome[2]))
+        long = max(outline.major, outline.minor)
+        short = min(outline.major, outline.minor)
+        return 2.0 / 3.0 * (rise / long) ** 2, 2.0 / 3.0 * (rise / short) ** 2
+
+
+def _centre_motion(field: DisplacementField, outline: Outline) -> CentreMotion | None:
+    """Fit the motion about the centre of a field by least squares.
+
+    Return None where too few points lie on the disk, or they do not determine it.
+    """
+    share = outline.share(field.points)
+    is_on_disk = share < 1.0
+    points = field.points[is_on_disk]
+    displacement = field.displacement[is_on_disk]
+    if len(points) < MIN_POINTS:
+        return None
+    size = 0.5 * (outline.major + outline.minor)
+    clamped = (1.0 - share[is_on_disk] ** 2)[:, None]
+    terms = np.hstack([clamped, clamped * points / size, np.ones_like(clamped)])
+    solution, _, rank, _ = np.linalg.lstsq(terms, displacement, rcond=1e-9)
+    if rank < terms.shape[1]:
+        return None
+    residual = displacement[:, :2] - terms @ solution[:, :2]
+    degrees_of_freedom = 2 * (len(points) - terms.shape[1])
+    variance = float((residual**2).sum()) / degrees_of_freedom
+    inverse = np.linalg.inv(terms.T @ terms)
+    spread = inverse[1:3, 1:3].trace() / 2
+    error = float(np.sqrt(variance * spread)) / size
+    return CentreMotion(solution[0], np.asarray(solution[1:3].T / size), error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +162,7 @@ class MeasuredView:
         It is None where a field has too few points; with one field there is one entry.
         """
         ends = self.fields[:: max(1, len(self.fields) - 1)]
-        return tuple(centre_motion(field, self.outline, CONSISTENCY) for field in ends)
+        return tuple(_centre_motion(field, self.outline) for field in ends)
 
     @property
     def surfaces(self) -> list[RiseSurface]:

@@ -15,15 +15,15 @@ from ...meshes.bubble_model import default_increments
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
-from ..planning import Candidate, Planning, Precision
+from ..base import Candidate, Planning, Precision
+from . import BubbleTest, KnownSolution
+from .field_shape import folded
 from .objective import CORRELATION
 from .prepared import PreparedBubble
 from .prepared_readings import PreparedReadings
 from .readings import UNITS, GaugeReadings, ReadingSeries
 from .section import SheetSettings
 from .sheet import FLAT, with_sheet
-from .symmetry import folded
-from .test import BubbleTest, KnownSolution
 
 
 @dataclass(frozen=True)

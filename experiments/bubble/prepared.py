@@ -28,22 +28,21 @@ from ..base import Alternative, BasePrepared, MakeSolver, Masks, Reach, Weightin
 from ..cap import CapEstimate, cap_estimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
-from .doubts import doubts_of
-from .loaded_reference import loaded_alternative
+from . import PART, BubbleTest, KnownSolution, measured_fields
+from .doubts import doubts_of, outlying_points
+from .field_shape import folded, mirrored
+from .frame_doubts import loaded_alternative
 from .measured_view import MeasuredView
-from .nuisance import bubble_nuisance
+from .nuisance import SheetErrors, bubble_nuisance
 from .objective import FieldObjective
-from .point_doubts import outlying_points
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
-from .shared_errors import SheetErrors
 from .sheet import (
     FLAT,
     MeasuredSheet,
     measured_sheet,
     with_sheet,
 )
-from .symmetry import folded, mirrored
 from .targets import (
     FieldTarget,
     at_nodes,
@@ -55,7 +54,6 @@ from .targets import (
     with_place_numbers,
     with_unloaded_positions,
 )
-from .test import PART, BubbleTest, KnownSolution, measured_fields
 
 #: Objectives in words; sums are over pressures and components of the displacement, and errors are
 #: relative to the largest measured displacement of each.

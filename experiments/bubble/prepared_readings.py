@@ -1,9 +1,9 @@
-"""A bubble test without a camera, prepared with its readings, which makes the fit's comparison."""
+"""A bubble test without a camera, prepared with its readings: the fit's comparison, and doubts."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,14 +18,12 @@ from ..base import MakeSolver, Masks, Weighting
 from ..cap import CapEstimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
-from . import prepared
+from . import BubbleTest, prepared
 from .nuisance import reading_nuisance
 from .prepared import OBJECTIVES, PreparedInflation
-from .reading_doubts import doubts_of_readings
 from .reading_objective import ReadingObjective, reader_of
 from .readings import GaugeReadings, ReadingSeries
 from .sheet import FLAT, MeasuredSheet
-from .test import BubbleTest
 
 #: Largest distance of a gauge that reads the apex from the centre, as a share of the radius.
 CENTRAL = 0.03
@@ -141,3 +139,62 @@ def prepare(
     if isinstance(test.data, GaugeReadings):
         return PreparedReadings(test)
     return prepared.prepare(test, law, make_solver)
+
+
+@dataclass(frozen=True)
+class PlausibleReadings:
+    """Hold the usual ranges of readings of a bubble; heights are over the radius of the rim."""
+
+    min_height: float = 0.01  # largest height: less is a wrong unit, or no test
+    max_height: float = 1.0  # a hemisphere, which only soft membranes exceed
+    impossible_height: float = 4.0  # a balloon
+    min_correlation: float = 0.5  # rank correlation of height and pressure
+    #: Exponent of the height as a power of the pressure: 1/3 for a flat elastic sheet, 1 for a
+    #: tense one; above 1 height and pressure are exchanged.
+    exponents: tuple[float, float] = (0.1, 1.3)
+
+
+PLAUSIBLE = PlausibleReadings()
+
+
+def doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt]:
+    """Return the doubts about the readings of a test.
+
+    Parameters
+    ----------
+    test : BubbleTest
+    readings : GaugeReadings
+    """
+    doubts: list[Doubt] = []
+    for series in readings.series:
+        if series.quantity == "height":
+            doubts += _doubts_of_heights(series, test.outline.radius)
+    return doubts
+
+
+def _doubts_of_heights(series: ReadingSeries, radius: float) -> Iterator[Doubt]:
+    """Yield the doubts about one series of heights."""
+    highest = float(series.value.max())
+    pressure = series.pressure
+    share = highest / radius
+    largest = f"the {series.label} is {highest:.4g} mm at most, {share:.2g} of the radius"
+    if highest <= 0 or np.corrcoef(pressure, series.value)[0, 1] < -PLAUSIBLE.min_correlation:
+        words = f"the {series.label} falls with the pressure: turn its sign, or exchange columns"
+        yield Doubt("height-falls", True, words)
+        return
+    if not PLAUSIBLE.min_height <= share <= PLAUSIBLE.impossible_height:
+        yield Doubt("height-unit", True, f"{largest}: is the unit of length right, and the radius?")
+    elif share > PLAUSIBLE.max_height:
+        words = f"{largest}, more than a hemisphere: is a diameter given for the radius?"
+        yield Doubt("radius", False, words)
+    is_rising = series.value > 0.05 * highest
+    if is_rising.sum() < 3 or np.ptp(np.log(pressure[is_rising])) < 0.5:
+        return
+    exponent = float(np.polyfit(np.log(pressure[is_rising]), np.log(series.value[is_rising]), 1)[0])
+    low, high = PLAUSIBLE.exponents
+    if not low <= exponent <= high:
+        words = (
+            f"the {series.label} grows with the {exponent:.2g}th power of the pressure, a sheet's "
+            "with the third root to the first: are height and pressure exchanged?"
+        )
+        yield Doubt("exchanged", True, words)

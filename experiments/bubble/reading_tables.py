@@ -20,8 +20,16 @@ from ...readers.units import CURVATURE_UNITS, LENGTH_UNITS, PRESSURE_UNITS, STRA
 from ...solvers.base import Array
 from ..data_files import DataFile
 from ..sections import Place, named_format
-from .reading_sections import ApexSection, HeightsSection, ProfilesSection, TableSection
-from .readings import LIMITS, GaugeReadings, Quantity, ReadingSeries
+from .readings import (
+    LIMITS,
+    ApexSection,
+    GaugeReadings,
+    HeightsSection,
+    ProfilesSection,
+    Quantity,
+    ReadingSeries,
+    TableSection,
+)
 from .section import BubbleSection, outline_of
 
 #: Units of columns, and the key of those that have none, by the first word of a quantity.

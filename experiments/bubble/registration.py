@@ -22,22 +22,25 @@ from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array
-from .apex import centre_strain
+from .field_shape import Axes, centre_strain, symmetry_axes
 from .placement import (
     CLAMP_BEGINS,
     MIN_CLAMP_POINTS,
     Placement,
     RigidMotion,
+    Rim,
+    RiseSurface,
+    SemiAxes,
     clamp_motion,
+    clamp_of_motion,
     correlated_points,
     in_all_quarters,
     line_angle,
     plane_through,
+    rim_of_motion,
     rotation_about_z,
     without_motion,
 )
-from .rim import Rim, RiseSurface, SemiAxes, clamp_of_motion, rim_of_motion
-from .symmetry import Axes, symmetry_axes
 
 Point = tuple[float, float, float]
 PlaneOf = Literal["found", "clamp", "edge", "camera"]

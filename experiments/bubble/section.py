@@ -14,7 +14,7 @@ from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, Outline, check_outline, d
 from ...meshes.sampling import Facet
 from ...readers import sections
 from ..sections import ChannelSection, FormatSection, MemberSection, Place, Scales
-from .reading_sections import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection
+from .readings import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection
 from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[

@@ -22,9 +22,8 @@ from ...meshes.mesh import Mesh
 from ...meshes.sampling import FacetReading, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import Array
-from .smooth_field import SmoothField
-from .symmetry import mirrored
-from .test import BubbleTest
+from . import BubbleTest
+from .field_shape import SmoothField, mirrored
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,9 +41,8 @@ from ..data_files import READING, DataFile
 from ..measured import MeasuredKind, PreparedParts
 from ..sections import Place, listed_files
 from ..strips.load_objective import LoadObjective
-from ..strips.section import FilesSection
-from .doubts import scatter_notes
-from .evaluation import evaluate_history
+from ..strips.reading import FilesSection
+from .evaluation import evaluate_history, scatter_notes
 from .values import EvaluatedHistory, matched_rows
 
 #: Gauge length (mm) of strips along the yarns, which are homogeneous, so that it does not matter.

@@ -14,9 +14,8 @@ from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
 from ...readers.bending import BendingError, scatter
 from ...solvers.base import Array, BandEnd, History
-from ..forward import Studied
+from ..forward import STRAINS, Studied
 from ..predicted import PredictedRun, band_of
-from ..run_records import STRAINS
 from .curve import (
     CurvePoint,
     MeasuredComparison,

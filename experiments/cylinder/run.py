@@ -11,7 +11,7 @@ from ...errors import SolverFailure
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...solvers.base import Array, History
-from ..run_records import RunRecord
+from ..forward import RunRecord
 
 Model = CylinderModel | BeamModel
 

@@ -14,8 +14,7 @@ from ...materials.law import HypoelasticLaw
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting
 from ..measured import LoadsObjective, PreparedParts
-from .measured import Compared
-from .test import DeckTest
+from . import Compared, DeckTest
 
 #: Standard deviation of the difference of two rounded values, sqrt(1/12 + 1/12), in units of the
 #: last digit.

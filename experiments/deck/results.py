@@ -2,6 +2,9 @@
 
 A reading is what was measured: a quantity over another one, or fields of displacement. It knows
 where something was measured, not what: runs are cached by readings.
+
+Files of Exodus II, as MOOSE, Sierra and SfePy write them, are read here, as meshio reads the first
+time step of such a file alone.
 """
 
 from __future__ import annotations
@@ -26,7 +29,6 @@ from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES
 from ...solvers.decks import JOB
 from ...solvers.marc.t19 import T19File
 from ...solvers.result_files import ResultFrame, ResultMesh
-from .exodus import ExodusFile
 
 #: Names that programs give to the quantities of nodes.
 FIELDS = {"displacement": "^disp|^u$", "reaction": "^reac|^forc|^rf$"}
@@ -432,3 +434,85 @@ def _smooth(positions: Array, values: Array) -> scipy.interpolate.PchipInterpola
 def last_digit(largest: float, digits: int) -> float:
     """Return the size of the last of so many digits of the largest value."""
     return float(10.0 ** (np.floor(np.log10(largest)) + 1 - digits)) if largest > 0 else 0.0
+
+
+#: A component of a vector: "disp_x", "DISPLX".
+_COMPONENT = re.compile(r"(.+?)_?([xyz])", re.IGNORECASE)
+
+
+class ExodusFile:
+    """The results of an Exodus file: places of the nodes, node sets, and all time steps.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    mesh : ResultMesh
+        Nodes, numbered from 1, without elements.
+    sets : dict of str to array of int
+        Numbers of the nodes of every named set, by its name in capitals.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        netCDF4 is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import netCDF4
+
+        with netCDF4.Dataset(path) as dataset:
+            dataset.set_auto_mask(False)
+            variables = dataset.variables
+            self.mesh = ResultMesh.of_points(_places(variables))
+            set_names = _names(variables, "ns_names")
+            self.sets = {
+                name.upper(): variables[f"node_ns{number}"][:]
+                for number, name in enumerate(set_names, start=1)
+                if f"node_ns{number}" in variables
+            }
+            self._times = variables["time_whole"][:]
+            self._fields = _vectors(_nodal_variables(variables))
+
+    def frames(self) -> Iterator[ResultFrame]:
+        """Yield the results of every time step."""
+        for step, time in enumerate(self._times):
+            fields = {name: values[step] for name, values in self._fields.items()}
+            yield ResultFrame(float(time), fields=fields)
+
+
+def _places(variables: Any) -> np.ndarray:
+    """Return the places (nodes, axes) of the nodes along the axes that the file has."""
+    if "coord" in variables:
+        return np.transpose(variables["coord"][:])
+    keys = [key for key in ("coordx", "coordy", "coordz") if key in variables]
+    return np.column_stack([variables[key][:] for key in keys])
+
+
+def _names(variables: Any, key: str) -> list[str]:
+    """Return the names in a table of characters (names, length), none where there is no table."""
+    if key not in variables:
+        return []
+    return [b"".join(row).split(b"\0")[0].decode().strip() for row in variables[key][:]]
+
+
+def _nodal_variables(variables: Any) -> dict[str, np.ndarray]:
+    """Return the values (steps, nodes) of every nodal variable: an array each, or one for all."""
+    names = _names(variables, "name_nod_var")
+    if "vals_nod_var" in variables:
+        return dict(zip(names, np.moveaxis(variables["vals_nod_var"][:], 1, 0), strict=True))
+    return {name: variables[f"vals_nod_var{k}"][:] for k, name in enumerate(names, start=1)}
+
+
+def _vectors(scalars: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the fields (steps, nodes, c): components of a vector are one field."""
+    components: dict[str, list[str]] = {}
+    for name in sorted(scalars, key=str.lower):
+        component = _COMPONENT.fullmatch(name)
+        components.setdefault(component[1] if component else name, []).append(name)
+    return {
+        stem if len(names) > 1 else names[0]: np.stack([scalars[name] for name in names], axis=-1)
+        for stem, names in components.items()
+    }

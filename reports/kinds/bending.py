@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...experiments.base import Weighting
+from ...experiments.base import Findings, FittedTest, Weighting
 from ...experiments.bending import BendingKind, BendingObjective, BendingTest, PreparedBending
 from ...experiments.cylinder.test import PART
 from ...experiments.data_files import Output
-from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
 from ...lazy_modules import pandas as pd

@@ -9,16 +9,20 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolverFailure
-from ...experiments.biaxial import BiaxialKind
-from ...experiments.biaxial.evaluation import NAMES, BiaxialEvaluation
-from ...experiments.biaxial.evaluation_tables import CONVENTION, STANDARD, in_words, tables_of
+from ...experiments.base import UNMATCHED, Findings, FittedTest
+from ...experiments.biaxial import BiaxialKind, BiaxialTest
+from ...experiments.biaxial.evaluation import (
+    CONVENTION,
+    NAMES,
+    STANDARD,
+    BiaxialEvaluation,
+    in_words,
+    tables_of,
+)
 from ...experiments.biaxial.prepared import PathObjective, PreparedBiaxial
-from ...experiments.biaxial.test import BiaxialTest
 from ...experiments.data_files import READING, Output
-from ...experiments.fitted import UNMATCHED, Findings, FittedTest
-from ...experiments.forward import Cards, Runs, Simulation
+from ...experiments.forward import Cards, Runs, Simulation, by_strain, strains_of
 from ...experiments.measured import PERCENT, FittedPart, compared
-from ...experiments.run_records import by_strain, strains_of
 from ...lazy_modules import pandas as pd
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations

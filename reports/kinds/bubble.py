@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import SolverFailure
-from ...experiments.bubble import BubbleKind
+from ...experiments.base import Findings, FittedTest
+from ...experiments.bubble import PART, BubbleKind, BubbleTest, apex_heights
 from ...experiments.bubble import findings as wording
+from ...experiments.bubble.field_shape import MIN_STRAIN_POINTS, smooth_strains
 from ...experiments.bubble.findings import fitted_model, objective_of
 from ...experiments.bubble.measured_view import MeasuredView
 from ...experiments.bubble.objective import OFFSETS, amounts_of
@@ -27,13 +29,9 @@ from ...experiments.bubble.recorded_frames import RecordedFrames
 from ...experiments.bubble.registration import CameraRegistration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
 from ...experiments.bubble.sheet import interpolated_at_nodes, states
-from ...experiments.bubble.smooth_field import MIN_STRAIN_POINTS, smooth_strains
-from ...experiments.bubble.test import PART, BubbleTest, apex_heights
 from ...experiments.data_files import CaptionedFile, Output
-from ...experiments.fitted import Findings, FittedTest
-from ...experiments.forward import Cards, Runs, Simulation
+from ...experiments.forward import Cards, Runs, Simulation, by_strain, strains_of
 from ...experiments.measured import compared
-from ...experiments.run_records import by_strain, strains_of
 from ...inference.objective import Blocks
 from ...inference.reported import moduli_error
 from ...lazy_modules import pandas as pd

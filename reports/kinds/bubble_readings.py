@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ...experiments.base import Findings, FittedTest
 from ...experiments.bubble.prepared_readings import PreparedReadings
 from ...experiments.bubble.reading_objective import ReadingObjective
 from ...experiments.bubble.readings import ReadingSeries
 from ...experiments.data_files import READING, Output
-from ...experiments.fitted import Findings, FittedTest
 from ...experiments.measured import compared
 from ...lazy_modules import pandas as pd
 from ...notes import Note, NoteKind

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolverFailure
+from ...experiments.base import Findings, FittedTest
 from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles, Specimen
 from ...experiments.data_files import READING, Output
-from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
 from ...lazy_modules import pandas as pd

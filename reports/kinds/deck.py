@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ...experiments.base import Findings, FittedTest
 from ...experiments.data_files import Output
-from ...experiments.deck import DeckKind
-from ...experiments.deck.measured import Compared
+from ...experiments.deck import Compared, DeckKind, DeckTest
 from ...experiments.deck.prepared import DeckObjective, PreparedDeck
-from ...experiments.deck.test import DeckTest
-from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
 from ...lazy_modules import pandas as pd

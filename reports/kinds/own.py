@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...experiments.fitted import Findings, FittedTest
+from ...experiments.base import Findings, FittedTest
 from ...experiments.forward import Simulation
 from ...experiments.measured import compared
 from ...experiments.own import OwnKind, PreparedOwn

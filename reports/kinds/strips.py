@@ -11,18 +11,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, SolverFailure
+from ...experiments.base import DIRECTIONS_MISSED, UNMATCHED, Findings, FittedTest
 from ...experiments.data_files import READING, Output
-from ...experiments.fitted import DIRECTIONS_MISSED, UNMATCHED, Findings, FittedTest
-from ...experiments.forward import CardRun, Cards, Runs, Simulation
+from ...experiments.forward import CardRun, Cards, Runs, Simulation, by_strain, strains_of
 from ...experiments.measured import FittedPart, compared
-from ...experiments.run_records import by_strain, strains_of
-from ...experiments.strips import StripsKind
-from ...experiments.strips.curve_shape import compare_orders
-from ...experiments.strips.data import Strip
+from ...experiments.strips import StripsKind, StripsTest
+from ...experiments.strips.data import Strip, compare_orders
 from ...experiments.strips.doubts import curves_of
 from ...experiments.strips.load_objective import LoadObjective
 from ...experiments.strips.prepared import PreparedStrips, loads_to_match
-from ...experiments.strips.test import StripsTest
 from ...lazy_modules import pandas as pd
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...experiments.base import Findings, FittedTest
 from ...experiments.data_files import Output
-from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import PERCENT, compared, errors_of_cards
-from ...experiments.tube import TubeKind
-from ...experiments.tube.prepared import PreparedTube, TubeObjective
-from ...experiments.tube.test import PART, TubeTest
+from ...experiments.tube import PART, PreparedTube, TubeKind, TubeObjective, TubeTest
 from ...lazy_modules import pandas as pd
 from ...presenting import KINDS
 from ...solvers.base import History

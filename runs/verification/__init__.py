@@ -1,6 +1,6 @@
 """Verification: published and closed-form numbers beside those of the installed program.
 
-bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject; a module a subject.
+bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject.
 """
 
 from __future__ import annotations
@@ -17,15 +17,11 @@ from ...lazy_modules import pandas as pd
 from ...notes import Verdict
 from ..folder import Reported
 from ..progress import Listener, listener
-from .abaqus import abaqus_bubbles
-from .bars import marc_bars, with_calculix
-from .bent_tube import bent_tubes
-from .hencky import hencky_membranes
-from .loaded_tubes import loaded_tubes
+from .bubbles import abaqus_bubbles, hencky_membranes, marc_bubble, poisson_ratios
 from .number import Number as Number
-from .thesis_bubble import marc_bubble, poisson_ratios
-from .thesis_strips import measured_strips, strips
 from .thin_walls import thin_walls
+from .tubes import bent_tubes, loaded_tubes
+from .uniaxial import marc_bars, measured_strips, strips, with_calculix
 
 SUBJECTS = {
     "bars": marc_bars,

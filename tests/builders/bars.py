@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments import presenter, registry
+from bubblefit.experiments import registry
 from bubblefit.experiments.base import BaseKind, BaseTest
 from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.forward import CardRun, Simulation, Studied
@@ -114,7 +114,7 @@ def _said(run: CardRun) -> object:
 
 def known_bars(patch: Any, solver: BarSolver) -> BarSolver:
     """Make bars a kind of test, and this solver the one of that name."""
-    known, reports = {**registry.kinds(), "bars": BarKind()}, presenter.presenter_of
+    known, reports = {**registry.kinds(), "bars": BarKind()}, registry.presenter_of
     patch.setattr("bubblefit.project.project.kinds", lambda: known)
     for module in ("runs.simulation", "project.project"):
         patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)

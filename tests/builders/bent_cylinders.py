@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
-from bubblefit.experiments.run_records import RunRecord
+from bubblefit.experiments.forward import RunRecord
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.closed_surfaces import enclosed_volume

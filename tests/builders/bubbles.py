@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 from bubblefit.experiments.bubble.doubts import doubts_of
+from bubblefit.experiments.bubble.field_shape import mirrored
 from bubblefit.experiments.bubble.measured_view import MeasuredView
-from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.deck.differences import ANY_LAW, DeckSolver
 from bubblefit.experiments.deck.input_file import InputDeck
 from bubblefit.experiments.deck.model import DeckModel
 from bubblefit.experiments.deck.results import DeckReader, Probe, QuantityReading
+from bubblefit.experiments.deck.solvers import ANY_LAW, DeckSolver
 from bubblefit.project.project import Project, read_project
 from bubblefit.solvers.calculix.solver import CalculixSolver
 

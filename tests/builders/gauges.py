@@ -3,8 +3,8 @@
 from functools import cache
 
 import numpy as np
+from bubblefit.experiments.bubble.field_shape import mirrored
 from bubblefit.experiments.bubble.readings import ReadingSeries
-from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, elliptic_disk_mesh

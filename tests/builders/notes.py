@@ -15,9 +15,9 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import states
 from bubblefit.experiments.base import Alternative
 from bubblefit.experiments.bubble.findings import notes_of_slack, warnings_of
-from bubblefit.experiments.bubble.loaded_reference import LOADED_REFERENCE
-from bubblefit.experiments.cycles.doubts import scatter_notes
-from bubblefit.experiments.run_records import notes_of
+from bubblefit.experiments.bubble.frame_doubts import LOADED_REFERENCE
+from bubblefit.experiments.cycles.evaluation import scatter_notes
+from bubblefit.experiments.forward import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.noise import Misfit
@@ -34,9 +34,9 @@ from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace
 from bubblefit.reports.kinds import bubble_readings
-from bubblefit.runs.alternatives import AlternativeFit, AlternativeFits
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
+from bubblefit.runs.fit import AlternativeFit, AlternativeFits
 from bubblefit.runs.refinement import refine, vary_nu12
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import simulate_cards

@@ -6,9 +6,9 @@ which differ from run to run.
 """
 
 import numpy as np
-from bubblefit.experiments.deck.differences import ANY_LAW, DeckSolver
 from bubblefit.experiments.deck.model import DeckModel
 from bubblefit.experiments.deck.results import DeckReader, Probe, QuantityReading
+from bubblefit.experiments.deck.solvers import ANY_LAW, DeckSolver
 from bubblefit.project.project import read_project
 from bubblefit.solvers.calculix.solver import CalculixSolver
 

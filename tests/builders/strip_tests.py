@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from bubblefit.experiments.measured import FittedPart
-from bubblefit.experiments.presenter import presenter_of
+from bubblefit.experiments.registry import presenter_of
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.materials.law import HypoelasticLaw

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.tube.test import LOADS
+from bubblefit.experiments.tube import LOADS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import TubeModel
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -14,7 +14,7 @@ from bubblefit.runs.check import check
 from ..builders.bubbles import BUBBLE_MISTAKES as BUBBLE_TRAPS
 from ..builders.bubbles import MISTAKES_WITH_OWN_TESTS as BUBBLE_TESTS
 from ..builders.projects import EASY, known_bubble_in_camera_frames
-from ..experiments.biaxial.test_doubts import TRAPS as BIAXIAL_TRAPS
+from ..experiments.biaxial.test_prepared import TRAPS as BIAXIAL_TRAPS
 from ..field.test_strip_mistakes import TRAPS as STRIP_TRAPS
 from ..support.commands import in_process, one_line, result_in
 from ..support.paths import ROOT
@@ -139,7 +139,7 @@ def test_trusted_doubt_passes_and_is_recorded(folder):
     in_process("bubble", "t.toml", "--starts", 1, "--resume", "--out", "t", cwd=folder)
 
 
-#: Doubts about specimens beside their twins, which tests/experiments/strips/test_twins.py provokes.
+#: Doubts about specimens beside their twins: tests/experiments/strips/test_doubts.py provokes them.
 STRIP_TWINS = {"repeated-specimen": True, "odd-specimen": False}
 
 

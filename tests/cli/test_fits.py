@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 from bubblefit.cli.fits import warning_lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
-from bubblefit.experiments.cycles.doubts import SLIP
+from bubblefit.experiments.cycles.evaluation import SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
-from bubblefit.experiments.run_records import UNSTABLE
+from bubblefit.experiments.forward import UNSTABLE
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.inference.reported import BOUND, MARGIN, UNCERTAIN
 from bubblefit.notes import GRAVE, SOLVER, Note, gravest_notes
-from bubblefit.runs.answers import answers
 from bubblefit.runs.certainty import MESH, UNKNOWN
 from bubblefit.runs.result import ALONE, STARTS
-from bubblefit.runs.verdict import NOT_CONVERGED
+from bubblefit.runs.verdict import NOT_CONVERGED, answers
 
 from ..builders.projects import constant_strips
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.experiments.deck.differences import ANY_LAW
+from bubblefit.experiments.deck.solvers import ANY_LAW
 from bubblefit.project.project import read_project
 from click.testing import CliRunner
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from bubblefit import cycles
 from bubblefit.experiments.cycles import specimen_of
-from bubblefit.experiments.cycles.doubts import SLIP
-from bubblefit.experiments.cycles.evaluation import evaluate_history
+from bubblefit.experiments.cycles.evaluation import SLIP, evaluate_history
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw

@@ -8,7 +8,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.experiments.bubble.symmetry import mirrored
+from bubblefit.experiments.bubble.field_shape import mirrored
 from bubblefit.experiments.own import OwnTest
 from bubblefit.inference.nuisance_fit import fit_nuisance
 from bubblefit.inference.objective import FunctionObjective

@@ -5,8 +5,7 @@ import logging
 import pytest
 from bubblefit.errors import PlugInFailure
 from bubblefit.experiments import registry
-from bubblefit.experiments.presenter import presenter_of
-from bubblefit.experiments.registry import NEEDED, kind_named, kinds
+from bubblefit.experiments.registry import NEEDED, kind_named, kinds, presenter_of
 
 from ..builders.plug_ins import install_plug_in
 from ..support.refusals import complaint, raised

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.sections import Place, named_format
+from bubblefit.experiments.sections import Fabric, Place, named_format
 
 from ..support.refusals import complaint
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.tables import read_biaxial_table
+from bubblefit.experiments.biaxial.paths import read_biaxial_table
 from bubblefit.readers.curves import read_load_curves
 from bubblefit.readers.histories import read_pressure_log
 

@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 from bubblefit.errors import InputError
 from bubblefit.experiments.base import Reach
-from bubblefit.experiments.biaxial.tables import read_biaxial_table
+from bubblefit.experiments.biaxial.paths import read_biaxial_table
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

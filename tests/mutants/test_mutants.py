@@ -31,8 +31,8 @@ def test_one_mutant_per_place_is_drawn():
 
 
 def test_test_file_of_its_name_comes_first_then_those_that_import_it():
-    near = mutants.tests_near("runs/best.py")
-    assert near[0] == "tests/runs/test_best.py"
+    near = mutants.tests_near("runs/starts.py")
+    assert near[0] == "tests/runs/test_starts.py"
     assert "tests/runs/test_certainty.py" in near
     assert "tests/runs/test_in_use.py" not in near
 

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.sections import Place, Scales
+from bubblefit.experiments.sections import Fabric, Place, Scales
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import card_sources, chosen_cards

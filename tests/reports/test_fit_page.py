@@ -16,9 +16,9 @@ from bubblefit.reports.fit_page import MODULUS_TITLES, band_words
 from bubblefit.reports.html import percent
 from bubblefit.reports.kinds.strips import StripsPresenter
 from bubblefit.reports.vega import panel
-from bubblefit.runs.answers import answers
 from bubblefit.runs.fit_folder import HISTORY
 from bubblefit.runs.folder import versions
+from bubblefit.runs.verdict import answers
 
 from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI
 from ..support.charts import check_charts, data

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from bubblefit.experiments.base import Findings
 from bubblefit.experiments.data_files import Output
-from bubblefit.experiments.fitted import Findings
 from bubblefit.reports import presenter
 from bubblefit.reports.presenter import PagePresenter, PlugInPresenter, page_presenter_of
 

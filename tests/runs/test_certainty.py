@@ -21,8 +21,6 @@ from bubblefit.notes import gravest_notes
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import FitSection
 from bubblefit.runs import certainty as mesh_error
-from bubblefit.runs.answers import answers
-from bubblefit.runs.best import best_fit
 from bubblefit.runs.certainty import (
     LARGEST_CORRECTION,
     MESH,
@@ -33,6 +31,8 @@ from bubblefit.runs.certainty import (
     with_certainty,
 )
 from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.starts import best_fit
+from bubblefit.runs.verdict import answers
 
 from ..builders.projects import known_bubble
 from ..support.paths import KNOWN

@@ -25,7 +25,7 @@ from ..builders.projects import STRIP_MODULI, known_bubble
 bubbles = import_module("bubblefit.experiments.bubble.planning")
 
 
-strips = import_module("bubblefit.experiments.strips.planning")
+strips = import_module("bubblefit.experiments.strips.prepared")
 
 
 PLANNED_ENDS = (0.1, 0.1, 0.05)

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments import presenter
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.base import BaseKind, BaseTest
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
@@ -259,7 +258,7 @@ def mixed(tmp_path, monkeypatch):
     def kind_named(name):
         return kind if name == "strut" else ours(name)
 
-    for module in (predictions_module, kinds_of_test, project_module, presenter):
+    for module in (predictions_module, kinds_of_test, project_module):
         monkeypatch.setattr(module, "kind_named", kind_named)
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
     read = read_project(write_cylinder_project(tmp_path))

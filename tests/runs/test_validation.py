@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
-from bubblefit.experiments.run_records import BEYOND_CARD
+from bubblefit.experiments.forward import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.runs import validation
 from bubblefit.runs.result import Fit

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.runs.verification import SUBJECTS, Number, abaqus, thesis_bubble, verify
+from bubblefit.runs.verification import SUBJECTS, Number, bubbles, verify
 
 from ..builders.laws import TABLE_4_2
 from ..support.refusals import raised
@@ -42,12 +42,12 @@ def test_reference_numbers_are_the_published_ones(tmp_path):
     }  # fmt: skip
     theirs = {one.quantity: one.theirs for some in ours().values() for one in some}
     assert {what: theirs[what] for what in printed} == pytest.approx(printed, abs=5e-5)
-    assert thesis_bubble.SOLUTION == tuple(TABLE_4_2)
-    apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in thesis_bubble.PRESSURES]
+    assert bubbles.SOLUTION == tuple(TABLE_4_2)
+    apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in bubbles.PRESSURES]
     assert apex == pytest.approx([14.2, 20.05, 24.4, 28.1, 32.6, 36.5, 38.8], abs=0.2)
     raised(InputError, r"--subject: expected one of bars, hencky.* got 'hinge'", verify, ["hinge"])
     raised(InputError, r"valmex7318_load_gauge\.csv", verify, [], data=tmp_path)
-    assert abaqus.TABLE.is_file()
+    assert bubbles.TABLE.is_file()
 
 
 @pytest.mark.slow

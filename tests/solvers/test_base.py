@@ -14,7 +14,7 @@ from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
-from bubblefit.runs.verification.thesis_bubble import table_4_2_law
+from bubblefit.runs.verification.bubbles import table_4_2_law
 from bubblefit.runs.verification.thin_walls import (
     ISOTROPIC,
     RADIUS,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.runs.verification.abaqus import bubble_shapes, published_cases
+from bubblefit.runs.verification.bubbles import bubble_shapes, published_cases
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -1,7 +1,7 @@
 """Validation: the moment of a bent tube beyond its first wrinkle (Comer and Levy)."""
 
 import pytest
-from bubblefit.runs.verification.bent_tube import FIRST_WRINKLE, TubeWithPlaneEnds, published_moment
+from bubblefit.runs.verification.tubes import FIRST_WRINKLE, TubeWithPlaneEnds, published_moment
 
 
 def test_bent_tube_has_the_published_moment_beyond_its_first_wrinkle():

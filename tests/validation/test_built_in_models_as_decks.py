@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.deck.differences import DeckSolver
 from bubblefit.experiments.deck.model import DeckModel
 from bubblefit.experiments.deck.results import DeckReader, Probe, QuantityReading
+from bubblefit.experiments.deck.solvers import DeckSolver
 from bubblefit.inference.search import fit_from
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

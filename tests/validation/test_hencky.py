@@ -5,7 +5,7 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.runs.verification.hencky import (
+from bubblefit.runs.verification.bubbles import (
     FICHTER,
     MODULUS,
     RADIUS,

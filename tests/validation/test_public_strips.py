@@ -6,9 +6,8 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Weighting
-from bubblefit.experiments.fitted import DIRECTIONS_MISSED, FittedTest
-from bubblefit.experiments.presenter import presenter_of
+from bubblefit.experiments.base import DIRECTIONS_MISSED, FittedTest, Weighting
+from bubblefit.experiments.registry import presenter_of
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.materials.forms.polynomial import QUADRATIC
 from bubblefit.materials.law import HypoelasticLaw

@@ -13,9 +13,17 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.base import BaseTest, MakeSolver, Masks, Reach, Refined, Weighting
+from bubblefit.experiments.base import (
+    BaseTest,
+    Findings,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Reach,
+    Refined,
+    Weighting,
+)
 from bubblefit.experiments.data_files import Output
-from bubblefit.experiments.fitted import Findings, FittedTest
 from bubblefit.experiments.forward import CardRun, Simulation
 from bubblefit.experiments.measured import (
     MeasuredKind,

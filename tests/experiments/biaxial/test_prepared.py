@@ -1,17 +1,22 @@
-"""experiments/biaxial/prepared.py: residuals, noise and errors of biaxial paths."""
+"""experiments/biaxial/prepared.py: residuals and doubts of biaxial paths, and ratios proposed."""
 
+import bubblefit as bf
 import numpy as np
 import pytest
 import scipy
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.base import Planning, Precision, Weighting
+from bubblefit.experiments.biaxial.prepared import PreparedBiaxial, candidates
+from bubblefit.experiments.doubts import Expected
 from bubblefit.inference.linear import LinearisedFit
 from bubblefit.inference.noise import Noise
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import elongations
 
 from ...builders.biaxial_tests import (
     BENT_LAW,
     FIVE_RATIOS,
+    THICKNESS,
     biaxial_project,
     biaxial_rows,
     write_biaxial_rows,
@@ -94,3 +99,99 @@ def test_bands_hold_the_noise_of_the_rows_from_which_strains_count(tmp_path):
     # Sums of squares of independent errors scatter as chi-square does: 1 in 100 lies outside.
     low, high = scipy.stats.chi2.ppf([0.005, 0.995], 2 * draws)
     assert low < chi_square < high
+
+
+EXPECTED = Expected({"E1": (300.0, 3000.0), "E2": (200.0, 3000.0), "G12": (1.0, 300.0)})
+ROWS = biaxial_rows(BENT_LAW)
+
+
+def scaled(load=1.0, strain=1.0):
+    return [(r, load * a, load * b, strain * c, strain * d) for r, a, b, c, d in ROWS]
+
+
+#: Rows, and of each trap that they fall into whether it stops a fit and a word of it.
+TRAPS = {
+    "shares for percent": (scaled(strain=0.01), {"strain-unit": (True, "in the unit")}),
+    "percent times a hundred": (scaled(strain=100), {"strain-unit": (True, "changes by")}),
+    "newtons a metre": (scaled(load=1e3), {"load-unit": (True, "per width")}),
+    "loads of a fiftieth": (scaled(load=0.02), {"modulus": (True, "is the thickness right")}),
+    "yarns of the loads swapped": (
+        [(r, b, a, c, d) for r, a, b, c, d in ROWS], {"ratio": (True, "columns")},
+    ),
+    "another ratio": (
+        [("3:1" if r == "2:1" else r, *rest) for r, *rest in ROWS],
+        {"ratio": (False, "which is 2:1")},
+    ),
+    "yarns of the strains swapped": (
+        [(r, a, b, d, c) for r, a, b, c, d in ROWS], {"swapped": (True, "stretches more")},
+    ),
+}  # fmt: skip
+
+
+def doubts_of_table(folder, rows):
+    write_biaxial_rows(folder / "test.csv", rows)
+    (test,) = bf.read_project(biaxial_project(folder)).tests.values()
+    return {doubt.name: doubt for doubt in PreparedBiaxial(test).doubts(EXPECTED)}
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_mistakes_in_a_biaxial_table_are_doubted(tmp_path, trap):
+    rows, wanted = TRAPS[trap]
+    found = doubts_of_table(tmp_path, rows)
+    for name, (sure, words) in wanted.items():
+        assert found[name].sure == sure and words in found[name].text, found
+    if trap == "loads of a fiftieth":
+        (_, first, _, low, _), (_, last, _, high, _) = rows[0], rows[29]
+        modulus = (last - first) / (0.01 * (high - low)) / THICKNESS
+        assert f"is about {modulus:.3g} MPa" in found["modulus"].text
+    if trap in ("another ratio", "yarns of the strains swapped"):
+        assert set(found) == set(wanted)
+
+
+def test_good_biaxial_data_raise_no_doubt(tmp_path):
+    assert doubts_of_table(tmp_path, ROWS) == {}
+    noise = 0.005 * np.random.default_rng(3).standard_normal((len(ROWS), 4))
+    rows = [(r, *(np.array(rest) + n)) for (r, *rest), n in zip(ROWS, noise, strict=True)]
+    assert doubts_of_table(tmp_path, rows) == {}
+
+
+TRUE = HypoelasticLaw.linear(900.0, 600.0, 30.0, 0.24)
+
+
+def planning_of(tmp_path, noise=None, own=True) -> Planning:
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(TRUE, ["1:1", "2:1"]))
+    setup = fit_setup(biaxial_project(tmp_path, form="constant"))
+    (prepared,) = setup.tests
+    law = HypoelasticLaw(TRUE.beta, 0.24, [0.03, 0.04, 0.1], form=TRUE.form)
+    precision = {"biaxial: 1:1": Precision(0.02, 2.0, 29), "biaxial: 2:1": Precision(0.03, 4.0, 29)}
+    tests = [prepared] if own else []
+    place = prepared.test.place
+    return Planning(place, tests, precision if own else {}, law, setup.make_solver, noise)
+
+
+def test_candidate_ratios_reach_to_the_strains_of_the_law(tmp_path):
+    offered = candidates(planning_of(tmp_path))
+    assert [c.name for c in offered] == [
+        f"biaxial {r}" for r in ("1:1", "2:1", "1:2", "1:0", "0:1", "1:5", "5:1")
+    ]
+    assert {c.noise_is for c in offered} == {"that of biaxial"}
+    for candidate in offered:
+        (path,) = candidate.make().test.paths
+        share = np.log1p(path.strain[-1]) / [0.03, 0.04]
+        assert share.max() == pytest.approx(1.0, rel=1e-6) and len(path.load) == 20
+        wanted = biaxial_response(TRUE, path.load, THICKNESS).elongation
+        np.testing.assert_allclose(path.strain, wanted, rtol=1e-12)
+        np.testing.assert_allclose(path.load[0], 0.05 * path.load[-1])
+
+
+def test_noise_of_a_candidate_ratio_is_measured_given_or_assumed(tmp_path):
+    def noise(**options):
+        candidate = candidates(planning_of(tmp_path, **options))[0]
+        (one,) = candidate.make().comparisons(lambda *a: None, Weighting())
+        return candidate.noise_is, one.objective.least_noise
+
+    # The worse of both ratios, of which four neighbours err as one.
+    own, known = noise()
+    assert own == "that of biaxial" and known == pytest.approx(0.03 * np.sqrt(4.0 * 19 / 29))
+    assert noise(noise=0.05) == ("given", pytest.approx(0.05))
+    assert noise(own=False) == ("assumed", pytest.approx(0.01 * np.sqrt(19 / 5)))

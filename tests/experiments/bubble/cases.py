@@ -8,14 +8,13 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import scipy.sparse as sp
-from bubblefit.experiments.bubble.apex import Apex
+from bubblefit.experiments.bubble import BubbleTest
+from bubblefit.experiments.bubble.field_shape import Apex
 from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.targets import FieldTarget, with_place_numbers
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.sections import Place
+from bubblefit.experiments.sections import Fabric, Place
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.nuisance import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel

@@ -1,7 +1,6 @@
 """Fixtures of the tests of bubbles."""
 
 import re
-from functools import partial
 
 import bubblefit as bf
 import numpy as np
@@ -12,18 +11,13 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
 from ...builders.bubbles import DOUBTED_LAW, inflated_bubble
-from ...builders.projects import edited_project, known_bubble, known_bubble_in_camera_frames
+from ...builders.projects import known_bubble, known_bubble_in_camera_frames
 from .cases import CAMERA
 
 
 @pytest.fixture(scope="module")
 def clean_bubble():
     return inflated_bubble(DOUBTED_LAW)
-
-
-@pytest.fixture
-def edited_bubble(tmp_path):
-    return partial(edited_project, tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.experiments.base import FittedTest
 from bubblefit.experiments.bubble import findings as sheet_report
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.data_files import Output
-from bubblefit.experiments.fitted import FittedTest
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.reports.kinds import bubble as report
 from bubblefit.solvers.membrane.solver import MembraneSolver

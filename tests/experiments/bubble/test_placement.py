@@ -1,10 +1,15 @@
-"""experiments/bubble/placement.py: where a test lies in the view of the camera."""
+"""experiments/bubble/placement.py: where a test, and its rim, lie in the view of the camera."""
 
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.bubble.apex import centre_strain
-from bubblefit.experiments.bubble.placement import Placement, in_all_quarters, plane_through
+from bubblefit.experiments.bubble.field_shape import centre_strain
+from bubblefit.experiments.bubble.placement import (
+    Placement,
+    in_all_quarters,
+    plane_through,
+    rim_of_motion,
+)
 from bubblefit.readers.frames import Frame
 
 from .cases import CLAMP_RADIUS, camera_grid, rotation_by
@@ -41,3 +46,13 @@ def test_points_in_three_quarters_are_not_all_around(missing):
     assert in_all_quarters(points) and in_all_quarters(points[:, :2])
     assert not in_all_quarters(np.delete(points, [missing, missing + 4], axis=0))
     assert not in_all_quarters(points[:0])
+
+
+def test_elliptic_rim_is_found_with_its_direction():
+    points = camera_grid()[:, :2]
+    u, v = ((points - (4.0, -3.0)) @ rotation_by("z", 35.0)[:2, :2]).T / [[100.0], [70.0]]
+    on = np.clip(1 - u**2 - v**2, 0.0, None)
+    rise = 20.0 * on * (1 + 0.1 * u**2)
+    rim = rim_of_motion([(points[on > 0], rise[on > 0])], (100.0, 70.0), (3.0, -2.0))
+    assert (rim.x, rim.y) == pytest.approx((4.0, -3.0), abs=1e-3)
+    assert rim.angle == pytest.approx(35.0, abs=1e-3)

@@ -5,11 +5,9 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.base import Planning, Precision, Weighting
 from bubblefit.experiments.bubble.planning import CANDIDATES, USUAL, candidates
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.planning import Planning, Precision
-from bubblefit.experiments.sections import Place
+from bubblefit.experiments.sections import Fabric, Place
 from bubblefit.inference.linear import information_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -1,3 +1,5 @@
+"""experiments/bubble/prepared_readings.py: comparisons with readings, and doubts about them."""
+
 from dataclasses import replace
 
 import bubblefit as bf

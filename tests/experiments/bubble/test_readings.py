@@ -1,6 +1,8 @@
+"""experiments/bubble/readings.py: readings at few pressures, and the tables of a project."""
+
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.readings import LIMITS, GaugeReadings, frame_weights
+from bubblefit.experiments.bubble.readings import LIMITS, ApexSection, GaugeReadings, frame_weights
 
 from ...builders.gauges import PRESSURES, height_series
 
@@ -57,3 +59,25 @@ def test_noise_is_the_stated_one_else_the_scatter_of_specimens_else_a_usual_one(
     assert noise == pytest.approx(0.02 * np.sqrt(np.mean(rise**2)), rel=0.1)
     # The readings of a specimen err together: two specimens are little more than one comparison.
     assert pair.correlated_count == pytest.approx(12 / 1.25)
+
+
+@pytest.mark.parametrize(
+    ("keys", "quantity", "values", "measured"),
+    [
+        ({}, "curvature", [-0.002, 0.003], [0.002, 0.003]),
+        ({"curvature_is": "half"}, "curvature", [-0.001], [0.002]),
+        ({"curvature_is": "radius"}, "curvature", [500.0], [0.002]),
+        ({}, "strain", [0.05], [0.05]),
+        ({"strain_is": "logarithmic"}, "strain", [np.log(1.05)], [0.05]),
+    ],
+)
+def test_curvatures_and_strains_are_turned_into_one_over_r_and_extension(
+    keys, quantity, values, measured
+):
+    section = ApexSection(**keys)
+    np.testing.assert_allclose(section.measure(quantity, np.array(values)), measured)
+
+
+def test_noise_is_that_of_the_quantities_that_say_it():
+    assert ApexSection().noise_of == {}
+    assert ApexSection(strain_noise=1e-3).noise_of == {"strain": 1e-3}

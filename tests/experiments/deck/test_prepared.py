@@ -24,7 +24,7 @@ from ...builders.decks import (
 from ...builders.projects import fit_setup
 from ...support.needs import calculix
 from ...support.refusals import complaint_with, raised
-from .test_differences import RoundedBar
+from .test_solvers import RoundedBar
 
 VALUES = np.array([TRUE["C10"], TRUE["C01"]])
 

@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.base import FittedTest, Weighting
 from bubblefit.experiments.doubts import Expected
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.fitted import FittedTest
-from bubblefit.experiments.sections import Place, Scales
-from bubblefit.experiments.strips import KIND
+from bubblefit.experiments.sections import Fabric, Place, Scales
+from bubblefit.experiments.strips import KIND, StripsTest
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.doubts import doubts_of_strips
 from bubblefit.experiments.strips.gauge import virtual_strain_gauge
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.experiments.strips.prepared import PreparedStrips
-from bubblefit.experiments.strips.section import StripsSection
-from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.experiments.strips.reading import StripsSection
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns

@@ -1,10 +1,11 @@
-"""experiments/strips/reading.py: [[strips]] of a project, units, defaults, data by direction."""
+"""experiments/strips/reading.py: keys and gauges of a section, and the files that it names."""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.experiments.strips import StripsTest
+from bubblefit.experiments.strips.reading import StripsSection
 
 from ...builders.projects import project_file
 from ...support.refusals import complaint, complaint_with
@@ -401,3 +402,20 @@ def test_strips_in_grips_may_be_pulled_along_a_yarn(example_strips, angle, strai
     assert (warp or fill) == pytest.approx(ENDS["bias"])
     model = test.models()["bias"]
     assert np.abs(model.warp) == pytest.approx([angle / 90, 1 - angle / 90, 0], abs=1e-9)
+
+
+def test_gauge_of_an_angle_is_that_of_bias_then_of_all_strips():
+    section = StripsSection.model_validate(
+        {
+            "gauge_length": 20.0,
+            "final_length": 23.0,
+            "bias": {"final_length": 25.0},
+            "data": {"directions": {"0": "w*.csv", "15": ["a.csv", "b.csv"]}},
+        }
+    )
+    lengths = {
+        direction: (section.gauge(direction).gauge_length, section.gauge(direction).final_length)
+        for direction in ("warp", "bias", "15 degrees")
+    }
+    assert lengths == {"warp": (20, 23), "bias": (20, 25), "15 degrees": (20, 25)}
+    assert section.data.directions == {"0": ["w*.csv"], "15": ["a.csv", "b.csv"]}

@@ -1,11 +1,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.base import FittedTest, Weighting
 from bubblefit.experiments.bubble import KIND
 from bubblefit.experiments.bubble.readings import ReadingSeries
 from bubblefit.experiments.data_files import Output
-from bubblefit.experiments.fitted import FittedTest
 from bubblefit.presenting import KINDS
 from bubblefit.reports.kinds import bubble_readings
 from bubblefit.solvers.membrane.solver import MembraneSolver

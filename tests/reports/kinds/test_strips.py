@@ -8,8 +8,8 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.experiments.base import DIRECTIONS_MISSED, UNMATCHED
 from bubblefit.experiments.data_files import READING, Output
-from bubblefit.experiments.fitted import DIRECTIONS_MISSED, UNMATCHED
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.strips.data import Strip

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.experiments.data_files import Output
-from bubblefit.experiments.tube.prepared import TubeObjective
-from bubblefit.experiments.tube.test import PART
+from bubblefit.experiments.tube import PART, TubeObjective
 from bubblefit.meshes.strip_models import TubeModel
 from bubblefit.project.project import read_project
 from bubblefit.reports.kinds import tube

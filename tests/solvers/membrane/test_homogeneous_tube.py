@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.meshes.strip_models import TubeModel
-from bubblefit.runs.verification.thesis_bubble import table_4_2_law
+from bubblefit.runs.verification.bubbles import table_4_2_law
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...experiments.tube.cases import LINEAR, LOADED, RADIUS, THICKNESS, strains_of_tube
