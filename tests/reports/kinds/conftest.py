@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 
-from ....builders.bending_results import BENT, CURVE, LOAD, case, outcome_of, run
-from ....builders.bent_cylinders import ENDS
+from ...builders.bending_results import BENT, CURVE, LOAD, case, outcome_of, run
+from ...builders.bent_cylinders import ENDS
 
 
 # A band: both ends with one card, the prediction alone with another, whose other end failed
