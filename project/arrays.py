@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, did_you_mean
 from ..readers.bending import BendingCurve, bending_file_name
-from ..readers.biaxial import BiaxialTable
 from ..readers.curves import CURVES_FILE, DIRECTIONS, LoadCurve, direction_named
 from ..readers.frames import QUANTITIES, Frame, FrameSource, frame_file_name
+from ..readers.machine_tables import BiaxialTable
 
 Array: TypeAlias = NDArray[np.float64]
 #: Numbers as users have them: arrays, lists, or a list with one array per frame; and DataFrames.

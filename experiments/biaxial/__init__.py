@@ -15,8 +15,8 @@ from ...errors import InputError
 from ...lazy_modules import LazyFunction
 from ...materials.card import State
 from ...meshes.strip_models import PatchModel
-from ...readers.biaxial import BiaxialTable
 from ...readers.histories import LoadHistory, Pace, pace_of
+from ...readers.machine_tables import BiaxialTable
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
 from ..measured import MeasuredKind

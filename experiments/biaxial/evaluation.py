@@ -25,7 +25,7 @@ from ...lazy_modules import pandas as pd
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, ConstantsEvaluation, LinearPath, Options, line_of
 from ...notes import Note, State, Verdict, note_records
-from ...readers.biaxial import BiaxialTable
+from ...readers.machine_tables import BiaxialTable
 from ..base import UNMATCHED
 from ..forward import UNSTABLE
 from ..measured import PERCENT

@@ -18,9 +18,14 @@ import numpy as np
 
 from ...errors import InputError, check_one_of
 from ...materials.designers import RATIOS, shares
-from ...readers.biaxial import BiaxialTable
 from ...readers.histories import turns
-from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
+from ...readers.machine_tables import (
+    BiaxialTable,
+    Channel,
+    MachineTable,
+    TableOptions,
+    read_machine_table,
+)
 from ...readers.quantities import PAIRS
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ...solvers.base import Array

@@ -19,8 +19,8 @@ from ...materials.biaxial_patch import biaxial_response, largest_load
 from ...materials.designers import RATIOS, shares
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
-from ...readers.biaxial import BiaxialTable
 from ...readers.frames import FrameSource
+from ...readers.machine_tables import BiaxialTable
 from ...solvers.base import Array, History
 from ..base import Candidate, MakeSolver, Masks, Planning, Precision, Reach, Weighting
 from ..data_files import DataFile
