@@ -144,7 +144,11 @@ class ClosedForm:
         parameters: Sequence[str],
         **_: Any,
     ) -> tuple[History, Array]:
-        """Return the history with the slopes (values, parameters) of its values."""
+        """Return the history with the slopes (values, parameters) of its values.
+
+        Derivatives of displacements, (frames, nodes, 3, parameters), are zero at one node: the
+        model has no mesh.
+        """
         slope = np.column_stack([_slope(model, law, name) for name in parameters])
         return replace(self.run(model, law), load_slope=slope), np.zeros((1, 1, 3, len(parameters)))
 

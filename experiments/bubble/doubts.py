@@ -419,6 +419,7 @@ def strain_unlike_rise(view: MeasuredView) -> Iterator[Doubt]:
         f"dy), and {rises} calls for about {due}"
     )
     is_sure = comparison.is_outside(CONSISTENCY.impossible)
+    # Exchanged or flipped columns are named only where the strain is impossible without them.
     name, remedy = _remedy(comparison.assignment) if is_sure else ("strain-rise", "")
     if not remedy:
         remedy = "are dx, dy and dz all there and in one unit, and is the radius right?"
@@ -426,7 +427,11 @@ def strain_unlike_rise(view: MeasuredView) -> Iterator[Doubt]:
 
 
 def _remedy(assignment: Assignment) -> tuple[str, str]:
-    """Return the name of a doubt and what to do so that dx grows with x, dy with y."""
+    """Return the name of a doubt and what to do so that dx grows with x, dy with y.
+
+    The assignment is the sign and the column of the data that are the true dx, then those of the
+    true dy. No remedy ("") where it is the data's own.
+    """
     (x_sign, x_column), (y_sign, _) = assignment
     if x_column == 1:
         minus_x, minus_y = ("minus " if sign < 0 else "" for sign in (x_sign, y_sign))

@@ -138,7 +138,8 @@ def registration_nuisance(
     test : BubbleTest
     objective : FieldObjective
     estimates : mapping of str to float
-        Value at which each unknown starts, by name, if it lies within the bounds.
+        Value at which each unknown starts, by its name, if it lies within the bounds: degrees of
+        turn and tilt, mm of shift.
 
     Notes
     -----
@@ -149,6 +150,7 @@ def registration_nuisance(
     for quantity, prior in test.registration.items():
         is_turn = quantity == TURN
         largest = min(MAX_SIGMAS * prior, BOUNDS.turn) if is_turn else MAX_SIGMAS * prior
+        # "turn", "tilt" and "shift" are the beginnings of the unknowns' names.
         for name in (TURN, *MISALIGNMENTS):
             if not name.startswith(quantity):
                 continue

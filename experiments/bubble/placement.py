@@ -280,7 +280,7 @@ class Rim:
     angle : float, degrees
         Angle of the first semi-axis from x towards y, 0 for a circle.
     error : float, mm
-        Standard error of the centre.
+        Standard error of the centre: root of the sum of the variances of x and y.
     turn_error : float, degrees
         Standard error of the angle, 0 where the angle was given.
     scale : float

@@ -517,8 +517,9 @@ def _computed(
 ) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
     """Compute the data of a known solution.
 
-    Return the fields, the law that they were computed with, and whether mesh, increments and
-    solver are those of the fit.
+    Return the fields, one for each pressure, the law that they were computed with, and whether
+    mesh, increments and solver are those of the fit, so that data and model have the same errors.
+    Raise SolverFailure if the model cannot be run.
     """
     key = "data.known_solution"
     with test.place.errors_name(key):

@@ -318,7 +318,8 @@ class SheetSettings:
         Components (0 to 2) of the displacement of which a field that is the same at all pressures
         is taken out.
     reference_frame : int or None
-        Number of the frame from which displacements are counted, None for the reference picture.
+        Index, from 0, in the pressures of the test: the frame from which displacements are
+        counted; None for the reference picture.
     metric : int
         Number of monomials of x and y in the unknown strains of warp, fill and shear.
     metric_prior : float, %
@@ -438,7 +439,10 @@ def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) ->
 
 
 def _reference_frame(section: SheetSection, place: Place, pressures: Sequence[float]) -> int | None:
-    """Return the number of the frame from which displacements are counted, if one is named."""
+    """Return the index in pressures (from 0) of the frame from which displacements are counted.
+
+    None for the reference picture, where no frame is named.
+    """
     if section.from_pressure is None:
         return None
     is_close = np.isclose(pressures, section.from_pressure, rtol=1e-6)
