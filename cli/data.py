@@ -1,43 +1,34 @@
 """Commands that evaluate measured data: `gauge`, `dic sphere`, `biaxial` and `cycles`."""
 
+from __future__ import annotations
+
 import re
+import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from ..errors import InputError, OutputError
-from ..experiments.biaxial import BiaxialTest
-from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
-from ..experiments.biaxial.paths import canonical_ratio
-from ..experiments.biaxial.prepared import PreparedBiaxial
-from ..experiments.cycles.evaluation import cycles
-from ..experiments.strips.gauge import (
-    GaugeTable,
-    PairedLoads,
-    loads_at_frames,
-    virtual_strain_gauge,
-)
 from ..lazy_modules import pandas as pd
-from ..materials.designers import Options
 from ..notes import note_lines
-from ..project.project import Project, read_project
-from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
-from ..readers.spheres import Sphere, fit_sphere, points_of
-from ..reports.bubbles import sphere_charts
-from ..reports.run_pages import write_constants, write_cycles
-from ..reports.vega import save
-from ..runs.folder import Provenance, Store, data_rows, this_run
 from ..storage.writing import replacing
 from ..version import __version__
 from . import options as common
 from .options import check_out, columns_named, with_options
 from .terminal import FILE, command, group, show, written_to
+
+if TYPE_CHECKING:
+    from ..experiments.biaxial import BiaxialTest
+    from ..experiments.strips.gauge import PairedLoads
+    from ..project.project import Project
+    from ..readers.frames import Frame
+    from ..readers.spheres import Sphere
+    from ..runs.folder import Provenance
 
 #: Arguments of `PairedLoads` that are options of `bubblefit gauge`.
 LOAD_OPTIONS = (
@@ -138,6 +129,9 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
     loads, one a frame or paired by time, a load curve that `strips.data.files` of a project
     reads as it is; frames where correlation was lost, or without a load, are left out of it.
     """
+    from ..experiments.strips.gauge import GaugeTable, loads_at_frames, virtual_strain_gauge
+    from ..readers.frames import QUANTITIES, frame_files
+
     with _naming_options():
         loads = _loads(options, out.stem)
         files, note = frame_files(frames, "FRAMES")
@@ -175,6 +169,8 @@ def _frames(
     planar : bool
         Whether z and dz may be missing from the files.
     """
+    from ..readers.frames import FrameOptions, read_frames
+
     scale = LENGTH_UNITS[options["length_unit"]]
     columns = columns_named(options["columns"])
     flags = options["flag_column"]
@@ -198,6 +194,8 @@ def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
 
     `name` : name of the specimen, unless --specimen gives one.
     """
+    from ..experiments.strips.gauge import PairedLoads
+
     settings = {key: options[key] for key in LOAD_OPTIONS if options[key] is not None}
     if options["loads"] is None:
         for key in sorted(settings):
@@ -273,6 +271,9 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     Prints radius and centre with standard errors, the RMS distance, and with --radius the
     deviation from the radius of the ball.
     """
+    from ..readers.frames import frame_files
+    from ..readers.spheres import fit_sphere, points_of
+
     files, note = frame_files(frames, "FRAMES")
     if out is not None:
         _check_sphere_files(out, files, options["overwrite"])
@@ -327,11 +328,11 @@ def _sphere_row(name: str, sphere: Sphere, radius: float | None) -> dict[str, An
 
 def _deviations(rows: Sequence[Mapping[str, Any]], radius: float) -> dict[str, float]:
     """Return the radius of the ball, and the mean and largest deviation of the frames from it."""
-    deviations = np.array([row["deviation_percent"] for row in rows])
+    deviations = [row["deviation_percent"] for row in rows]
     return {
         "radius_mm": radius,
-        "mean_deviation_percent": np.abs(deviations).mean(),
-        "worst_deviation_percent": deviations[np.argmax(np.abs(deviations))],
+        "mean_deviation_percent": statistics.fmean(map(abs, deviations)),
+        "worst_deviation_percent": max(deviations, key=abs),
     }
 
 
@@ -339,6 +340,9 @@ def _write_spheres(
     out: Path, rows: Sequence[Mapping[str, Any]], names: Sequence[str], spheres: Sequence[Sphere]
 ) -> list[str]:
     """Write the table of the frames and their picture; return the names of the files."""
+    from ..reports.bubbles import sphere_charts
+    from ..reports.vega import save
+
     with replacing(out) as path:
         pd.DataFrame(rows).to_csv(path, index=False, lineterminator="\n")
     pictures = [
@@ -421,6 +425,14 @@ def biaxial_command(**options: Any) -> None:
     results of all other choices of options are written beside. `bubblefit fit` fits a law of any
     form to the same tests, and `bubblefit export` turns it into such constants.
     """
+    from ..experiments.biaxial import BiaxialTest
+    from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
+    from ..experiments.biaxial.paths import canonical_ratio
+    from ..materials.designers import Options
+    from ..project.project import read_project
+    from ..reports.run_pages import write_constants
+    from ..runs.folder import Store
+
     project = read_project(options["project"], common.data_folders(options["data"]))
     named = project.chosen(list(options["tests"]) or "biaxial", fitted=True)
     tests = [test for test in named if isinstance(test, BiaxialTest)]
@@ -450,6 +462,9 @@ def biaxial_command(**options: Any) -> None:
 
 def _provenance(project: Project, tests: Sequence[BiaxialTest]) -> Provenance:
     """Return the origin of constants of biaxial tests, which no solver computed."""
+    from ..experiments.biaxial.prepared import PreparedBiaxial
+    from ..runs.folder import Provenance, data_rows, this_run
+
     data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
     run = this_run(common.command_line())
     return Provenance(project.path, project.written.text, None, data, {}, [run])
@@ -502,6 +517,9 @@ def cycles_command(
     loops.csv (every reading), holds.csv (creep and relaxation), cycles.png and report.html, with
     --fit memory.csv and left-out.csv. Slip and drift of an extensometer are noted.
     """
+    from ..experiments.cycles.evaluation import cycles
+    from ..reports.run_pages import write_cycles
+
     folder = common.reserved_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():

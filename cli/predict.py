@@ -1,23 +1,25 @@
 """Commands that run tests with given material cards: `bubblefit bend` and `simulate`."""
 
+from __future__ import annotations
+
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError, SolverFailure
-from ..materials.card import MaterialCard
-from ..project.project import Project, chosen_cards, named_cards, project_of, read_project
-from ..project.schema import usual_folder
-from ..runs.predictions import Predictions, measured_tests, predict
-from ..runs.simulation import simulate_cards
 from ..storage.reading import missing_file_reason
 from . import options as common
 from .options import command_line, data_folders, with_solver
 from .solver_options import solver_choice
 from .terminal import FILE, WORSE, Decorator, command, group, resumable, show, written_to
+
+if TYPE_CHECKING:
+    from ..materials.card import MaterialCard
+    from ..project.project import Project
+    from ..runs.predictions import Predictions
 
 CYLINDER = "cylinder"
 #: Name in messages of `simulate bend`, which has no project file.
@@ -77,6 +79,8 @@ def run_predictions(
     cards : sequence of str, or mapping of str to MaterialCard
         Cards by name or file, or as they are; empty for those of the project.
     """
+    from ..runs.predictions import measured_tests, predict
+
     common.reserved_folder(folder)
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
@@ -150,6 +154,9 @@ def bend_command(**options: Any) -> None:
     report.html into the output folder. A run that fails is named and left out, everything else is
     written, the exit code is 4, and --resume tries it again.
     """
+    from ..project.project import read_project
+    from ..project.schema import usual_folder
+
     project = read_project(options["project"], data_folders(options["data"]))
     folder = options["out"]
     if folder is None:
@@ -202,6 +209,9 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None) -> N
     kind : str or None
         Kind of the tests that are run, unless --test names some; None for all.
     """
+    from ..project.project import chosen_cards
+    from ..runs.simulation import simulate_cards
+
     project = common.read_with_solver(options, need_data=False)
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
@@ -327,6 +337,8 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
     Writes what `bubblefit bend` writes; a project file (`bubblefit init --example bend`) takes
     several cylinders and sensors in volts.
     """
+    from ..project.project import named_cards
+
     name = f"{diameter:g} mm, {pressure:g} kPa"
     section = {"name": name, "diameter": diameter, "pressure": pressure}
     section |= {key: options[key] for key in SHAPE if options[key] is not None}
@@ -347,6 +359,8 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
 
 def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
     """Return a project of one cylinder; errors name the option instead of a key."""
+    from ..project.project import project_of
+
     thickness = next(iter(cards.values())).thickness
     fabric = {"name": "Inflated cylinder in bending", "thickness": thickness}
     try:

@@ -1,5 +1,7 @@
 """Commands for a first project: `bubblefit init` writes one, `schema` and `docs` explain it."""
 
+from __future__ import annotations
+
 import difflib
 import os
 import re
@@ -10,33 +12,21 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError, OutputError, Problems, SolverFailure, check_one_of
-from ..experiments.bubble import BubbleTest
-from ..experiments.deck.input_file import InputDeck
-from ..experiments.registry import kind_named
-from ..inference.methods import method_names
 from ..lazy_modules import rich_console
-from ..materials.forms.base import COMPONENTS, form_names
-from ..project.data_folder import (
-    angle_of,
-    proposed_tests,
-    recognised_groups,
-    strips_by_direction,
-)
-from ..project.project import Project, read_readable_tests
-from ..project.schema import SHIPPED, schema_text
-from ..readers.curves import direction_named
 from ..readers.units import LOAD_UNITS, PRESSURE_UNITS
-from ..runs.estimate import estimate
 from ..storage.templates import render
-from ..storage.writing import ROOT, unwritable_reason, write_text
+from ..storage.writing import ROOT, TEMPLATES, unwritable_reason, write_text
 from ..version import __version__
 from .options import numbers, with_options
 from .terminal import FILE, FOLDER, command, wrapped
+
+if TYPE_CHECKING:
+    from ..project.project import Project
 
 DOCS = ROOT / "docs"
 #: Folders of the documents; of pages with the same name, that in the first folder is meant.
@@ -57,6 +47,8 @@ KINDS = {
     "joint": ("joint-valmex7318", "bubblefit fit {} --data bubble=DIR", "test1.toml"),
 }
 PROJECT = "project.toml"
+#: The schema that is shipped, for the kinds of test and solvers that come with bubblefit.
+SHIPPED = TEMPLATES / "project" / "project.schema.json"
 #: Beginning of an example's first line, by which editors find the schema: in the repository, and in
 #: a folder of the user.
 SCHEMA_IN_PLACE = b"#:schema ../../templates/project/"
@@ -263,6 +255,8 @@ def _write_project(path: Path, text: str) -> None:
 
 def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     """Write a project for the files of a folder; what they do not tell is asked for, or marked."""
+    from ..project.data_folder import proposed_tests, recognised_groups
+
     path = folder / PROJECT
     _check_free(path)
     groups = recognised_groups(data)
@@ -288,6 +282,8 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
 
 def _write_for_deck(folder: Path, path: Path) -> None:
     """Write a template of a deck, with the files that it includes, and a project for it."""
+    from ..experiments.deck.input_file import InputDeck
+
     deck = InputDeck(path)
     constants = deck.constants()
     if not constants:
@@ -318,6 +314,9 @@ def _write_for_deck(folder: Path, path: Path) -> None:
 
 def _confirm_directions(tests: Sequence[dict[str, Any]]) -> None:
     """Ask on a terminal what angles in names mean; elsewhere a TODO of the project does."""
+    from ..project.data_folder import angle_of, strips_by_direction
+    from ..readers.curves import direction_named
+
     by_angle = [test for test in tests if test.get("by_angle") and on_a_terminal()]
     if not by_angle:
         return
@@ -336,6 +335,8 @@ def _text_for_data(
     data: Path,
 ) -> str:
     """Return the text of a project; its draft, with usual open sizes, is read for what it lacks."""
+    from ..experiments.bubble import BubbleTest
+
     without_cameras = all(test.get("template") == "gauges" for test in tests)
     usual = {**USUAL, "form": "constant"} if without_cameras else USUAL
     if len(tests) == 1 and tests[0].get("is_central"):
@@ -376,6 +377,10 @@ def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
     margin : float
         Factor between bounds and constant moduli that are estimated.
     """
+    from ..experiments.bubble import BubbleTest
+    from ..materials.forms.base import COMPONENTS
+    from ..runs.estimate import estimate
+
     try:
         estimated = estimate(project.with_law("constant"))
     except (InputError, SolverFailure):
@@ -426,6 +431,8 @@ def _answer(size: str) -> Any:
 
 def _read_draft(text: str, problems: Problems, need_data: bool = True) -> Project:
     """Read the text of a project file before it is written, as `read_readable_tests`."""
+    from ..project.project import read_readable_tests
+
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / PROJECT
         path.write_text(text, encoding="utf-8")
@@ -445,6 +452,10 @@ def _project_text(tests: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
     settings : mapping
         Values for all templates, with the keys of `USUAL`.
     """
+    from ..experiments.registry import kind_named
+    from ..inference.methods import method_names
+    from ..materials.forms.base import form_names
+
     counts = Counter(test["kind"] for test in tests)
     if not counts:
         raise InputError(None, "--own", f"name at least one test: --{', --'.join(WRITABLE)}")
@@ -497,6 +508,8 @@ def schema_command(out: Path | None) -> None:
 
     Editors complete and check a project whose first line names it: #:schema project.schema.json
     """
+    from ..project.schema import schema_text
+
     if out is None:
         click.echo(schema_text(), nl=False)
         return

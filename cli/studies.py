@@ -2,25 +2,24 @@
 
 Each reads the project and calls one function of `runs` by `run_study`, which prints the result."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError
-from ..project.project import Project
-from ..runs import compare as laws
-from ..runs import validation, weight_study
-from ..runs.bootstrap import bootstrap
-from ..runs.plan import plan
-from ..runs.profile import profile
-from ..runs.refinement import NU12, Refined, refine, vary_nu12
 from . import options as common
 from .fits import fit_options, with_fit_options
 from .solver_options import solver_choice
 from .terminal import Decorator, command, group, resumable, show, written_to
+
+if TYPE_CHECKING:
+    from ..project.project import Project
+    from ..runs.refinement import Refined
 
 
 def run_study(
@@ -161,6 +160,8 @@ def profile_command(
     else again, and continues until the data contradict or a bound is reached. Writes profile.csv,
     profile.png, report.html and result.json.
     """
+    from ..runs.profile import profile
+
     project = common.read_to_refit(options)
     usual_strains = [] if strain is None else common.numbers(strain, "--strain")
     if usual_strains and not moduli:
@@ -207,6 +208,8 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     optimum of the fit. Writes percentile bands of the moduli beside those of the fit:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
+    from ..runs.bootstrap import bootstrap
+
     settings = {"over": over, "samples": samples, "card": options["card"], "seed": options["seed"]}
     progress = common.LiveLine("samples", common.quiet(options))
     run_study(bootstrap, "bootstrap", common.read_to_refit(options), options, progress, **settings)
@@ -255,6 +258,8 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     Predicts one standard deviation of E1, E2 and G12 for each candidate beside the tests of
     PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
     """
+    from ..runs.plan import plan
+
     settings = {name: options[name] for name in ("card", "rank", "specimens")}
     settings["strain"] = None if strain is None else common.numbers(strain, "--strain")
     settings["noise"] = dict(map(_noise, noises))
@@ -302,8 +307,10 @@ def compare_command(**options: Any) -> None:
     whether more coefficients pay. Writes comparison.csv, figures, report.html and result.json, and
     a folder for each form, into the output folder.
     """
+    from ..runs.compare import STARTS, compare
+
     settings = {name: options[name] for name in ("forms", "folds", "fold_starts")}
-    run_fits(laws.compare, "compared", options, laws.STARTS, **settings)
+    run_fits(compare, "compared", options, STARTS, **settings)
 
 
 @command(
@@ -340,6 +347,8 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     --weights moduli and errors over the weight of a kind of test: weights.csv, weights.png,
     result.json.
     """
+    from ..runs import validation, weight_study
+
     path: Path = options["project"]
     forms = options["forms"]
     cards = options["cards"]
@@ -442,6 +451,8 @@ def study_mesh(refined: Refined, **options: Any) -> None:
     convergence and Richardson's limit. A level whose analysis fails is named and left out; when
     fewer than two end well the exit code is 4.
     """
+    from ..runs.refinement import refine
+
     settings = {name: options[name] for name in ("levels", "factor", "coarser")}
     name = "increments" if refined == "increments" else "mesh"
     run_with_card(name, refine, options, what=refined, **settings)
@@ -467,6 +478,8 @@ def study_nu12(values: tuple[float, ...], **options: Any) -> None:
     values. A value whose analysis fails is named and left out; when the card's own fails, or all
     others do, the exit code is 4.
     """
+    from ..runs.refinement import NU12, vary_nu12
+
     run_with_card("nu12", vary_nu12, options, values=values or NU12)
 
 

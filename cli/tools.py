@@ -1,5 +1,7 @@
 """Commands for solvers and pages: `cache`, `doctor`, `report` and `verify`."""
 
+from __future__ import annotations
+
 import os
 import re
 import sys
@@ -7,21 +9,21 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError, SolverFailure, check_one_of
-from ..reports.content import Report, side_by_side
-from ..reports.html import PAGE, print_page, write_page
-from ..reports.run_pages import page_of_folder
-from ..runs.folder import check_unused
-from ..runs.verification import SUBJECTS, Number, verify
-from ..solvers.base import Diagnosis
+from ..runs.verification import SUBJECTS
 from ..solvers.registry import command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
 from .options import AS_JSON, OVERWRITE, out_option, reserved_folder, with_options
 from .terminal import FILE, WORSE, command, show, written_to
+
+if TYPE_CHECKING:
+    from ..reports.content import Report
+    from ..runs.verification import Number
+    from ..solvers.base import Diagnosis
 
 BYTES = {"": 1, "B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
@@ -229,6 +231,9 @@ def report_command(
     The page is computed from the files of the folder alone: the same bytes but for the date. For
     a run that is not finished it shows the records so far.
     """
+    from ..reports.html import PAGE, print_page, write_page
+    from ..reports.run_pages import page_of_folder
+
     if len(folders) > 2:
         raise InputError(None, "FOLDER", f"give one folder or two, not {len(folders)}")
     for folder in folders:
@@ -260,6 +265,9 @@ def _check_folder(folder: Path) -> None:
 
 def _side_by_side(left: Path, right: Path) -> tuple[Path, Report, Path]:
     """Return the common folder of two output folders, their merged report, and its usual path."""
+    from ..reports.content import side_by_side
+    from ..reports.run_pages import page_of_folder
+
     reports = [page_of_folder(left), page_of_folder(right)]
     base = Path(os.path.commonpath([left.resolve(), right.resolve()]))
     names = [folder.resolve().relative_to(base).as_posix() for folder in (left, right)]
@@ -301,6 +309,9 @@ def verify_command(
     Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
     part where `bubblefit doctor` finds a usable one.
     """
+    from ..runs.folder import check_unused
+    from ..runs.verification import verify
+
     folder = out or Path("out/verified")
     check_unused(folder, resume=False, overwrite=overwrite)
     reserved_folder(folder)

@@ -50,7 +50,6 @@ from ..readers.sections import (
 )
 from ..solvers.registry import solver_sections
 from ..storage.reading import read_toml
-from ..storage.writing import TEMPLATES
 
 
 def error_in_bounds(message: str) -> ValidationError:
@@ -372,8 +371,6 @@ def _merged(common: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, 
     return merged
 
 
-#: The schema that is shipped, for the kinds of test and solvers that come with bubblefit.
-SHIPPED = TEMPLATES / "project" / "project.schema.json"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 REFERENCE = re.compile(r'"#/\$defs/([^"]+)"')
 

@@ -6,34 +6,34 @@ bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ...arguments import checked_arguments
 from ...errors import check_one_of
+from ...lazy_modules import LazyFunction
 from ...lazy_modules import pandas as pd
 from ...notes import Verdict
 from ..folder import Reported
 from ..progress import Listener, listener
-from .bubbles import abaqus_bubbles, hencky_membranes, marc_bubble, poisson_ratios
 from .number import Number as Number
-from .thin_walls import thin_walls
-from .tubes import bent_tubes, loaded_tubes
-from .uniaxial import marc_bars, measured_strips, strips, with_calculix
 
 SUBJECTS = {
-    "bars": marc_bars,
-    "hencky": hencky_membranes,
-    "abaqus": abaqus_bubbles,
-    "marc bubble": marc_bubble,
-    "strips": strips,
-    "thin walls": thin_walls,
-    "bent tube": bent_tubes,
-    "loaded tubes": loaded_tubes,
-    "nu12": poisson_ratios,
-    "calculix": with_calculix,
+    subject: LazyFunction(f"{__name__}.{module}", function)
+    for subject, module, function in (
+        ("bars", "uniaxial", "marc_bars"),
+        ("hencky", "bubbles", "hencky_membranes"),
+        ("abaqus", "bubbles", "abaqus_bubbles"),
+        ("marc bubble", "bubbles", "marc_bubble"),
+        ("strips", "uniaxial", "strips"),
+        ("thin walls", "thin_walls", "thin_walls"),
+        ("bent tube", "tubes", "bent_tubes"),
+        ("loaded tubes", "tubes", "loaded_tubes"),
+        ("nu12", "bubbles", "poisson_ratios"),
+        ("calculix", "uniaxial", "with_calculix"),
+    )
 }
 
 
@@ -134,8 +134,10 @@ def verify(
     chosen = list(SUBJECTS if subjects is None else subjects)
     for subject in chosen:
         check_one_of(subject, SUBJECTS, "--subject")
-    comparisons = {name: SUBJECTS[name] for name in chosen}
+    comparisons: dict[str, Callable[[], Iterable[Number]]] = {n: SUBJECTS[n] for n in chosen}
     if data is not None:
+        from .uniaxial import measured_strips
+
         comparisons["measured strips"] = functools.partial(measured_strips, Path(data))
     on_event = listener(progress)
     numbers = dict[str, Sequence[Number]]()

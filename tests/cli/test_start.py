@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import jsonschema
 import pytest
 from bubblefit.cli import start
-from bubblefit.cli.start import KINDS
+from bubblefit.cli.start import KINDS, SHIPPED
 from bubblefit.project.project import read_project
-from bubblefit.project.schema import SHIPPED, project_schema, read_content, validated
+from bubblefit.project.schema import project_schema, read_content, validated
 from click.testing import CliRunner
 
 from ..builders.projects import known_bubble

@@ -5,11 +5,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from bubblefit.cli import tools
 from bubblefit.reports import html
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
+from bubblefit.runs import verification
 from bubblefit.runs.folder import Provenance
 
 from ..builders.pages import drawn, full_report
@@ -131,7 +131,7 @@ def test_second_verification_is_refused_before_it_computes(tmp_path, monkeypatch
     in_process(*bars, cwd=tmp_path)
     first = (tmp_path / "out" / "verified" / "result.json").stat().st_mtime_ns
     with monkeypatch.context() as patched:
-        patched.setattr(tools, "verify", lambda *_, **__: pytest.fail("it computes"))
+        patched.setattr(verification, "verify", lambda *_, **__: pytest.fail("it computes"))
         refused = in_process(*bars, cwd=tmp_path, code=2)
     one_line(refused, "already holds a result; use --overwrite or another --out")
     in_process(*bars, "--overwrite", cwd=tmp_path)

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.cli.start import SHIPPED
 from bubblefit.experiments.sections import Fabric, Place, Scales
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import card_sources, chosen_cards
-from bubblefit.project.schema import SHIPPED, CardSection, NamedCard, read_cards, schema_text
+from bubblefit.project.schema import CardSection, NamedCard, read_cards, schema_text
 
 from ..support.refusals import complaint
 
