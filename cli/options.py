@@ -386,6 +386,10 @@ class LiveLine(Count):
         waits = "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
         note = self.note + waits
         total = self.total or None
+        if total is not None and self.done >= total:  # the page is near
+            from ..reports.converter import convert
+
+            convert.prepare()
         EVENTS.progress(self.counted, self.done, total, note)
         if self.bar is not None:
             self.bar.update(

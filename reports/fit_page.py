@@ -57,6 +57,7 @@ from .charts import (
     spans_a_decade,
 )
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
+from .converter import background
 from .html import write_report
 from .presenter import page_presenter_of
 from .provenance import NOTES_FILE, RESULT_FILE, about_of, citation, record_tables
@@ -410,6 +411,7 @@ FILES = (
 )
 
 
+@background.during_page()
 def write_fit(fit: Fit, folder: Path) -> Path:
     """Write all files of a finished fit into its output folder.
 
@@ -481,9 +483,15 @@ def _page(fit: Fit, folder: Path) -> Report:
             PageSection("The record", _record(fit, exhibits)),
             PageSection("How to cite", citation()),
         ],
-        files=[file for file in files if file[0] == RESULT or (folder / file[0]).exists()],
+        files=_present(files, folder),
         versions=fit.result["versions"],
     )
+
+
+def _present(files: Sequence[tuple[str, str]], folder: Path) -> list[tuple[str, str]]:
+    """Return the files that the folder has when its pictures are drawn, and result.json."""
+    background.wait()
+    return [file for file in files if file[0] == RESULT or (folder / file[0]).exists()]
 
 
 def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:

@@ -8,12 +8,14 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from dataclasses import fields
 from datetime import date
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from markupsafe import Markup
 from PIL import UnidentifiedImageError
@@ -81,21 +83,42 @@ def write_page(
         The page cannot be written.
     """
     path = folder / PAGE if path is None else path
+    with converter.background.during_page():
+        converter.background.wait()  # pictures of the folder stand in the page
+        write_text(path, _rendered(folder, report, letterhead))
+    return path
+
+
+def _rendered(folder: Path, report: Report, letterhead: Path | None) -> str:
+    """Return the text of a page; charts are drawn while the rest of it is rendered."""
     from jinja2 import FileSystemLoader
+
+    drawings: dict[str, Callable[[], Markup]] = {}
+    pictures = {
+        part.file: converter.background.begin(data_uri, folder, part.file)
+        for part in report.parts
+        if part.part == "picture"
+    }
+
+    def drawn(spec: vega.Spec) -> Markup:
+        """Begin to draw a chart, and return the mark that it replaces later."""
+        mark = uuid4().hex
+        drawings[mark] = converter.background.begin(vega.figure, spec)
+        return _trusted(mark)
 
     html = template_environment(FileSystemLoader(TEMPLATES / "report"), escapes_html=True)
     html.filters |= {
         "number": number,
         "percent": percent,
         "chart_views": chart_views,
-        "drawn": vega.figure,
+        "drawn": drawn,
         "map_views": maps.map_views,
         "maps_data": maps.maps_data,
         "as_script": as_script,
         "solid_view": maps.solid_view,
         "solid_data": maps.solid_data,
         "data_link": data_link,
-        "data_uri": lambda file: data_uri(folder, file),
+        "data_uri": lambda file: pictures[file](),
         "folds": folds,
         "long": long,
         "tied": lambda text: TIED.sub("\u00a0", text),
@@ -119,8 +142,8 @@ def write_page(
         "laboratory": dict(report.about).get("laboratory", ""),
         "policy": policy(style, script, library),
     }
-    write_text(path, html.get_template("report.html.j2").render(context))
-    return path
+    text = html.get_template("report.html.j2").render(context)
+    return re.sub("|".join(drawings) or "$^", lambda mark: drawings[mark[0]](), text)
 
 
 def running_title(title: str) -> str:

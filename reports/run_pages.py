@@ -46,6 +46,7 @@ from .content import (
     notes_section,
     read_page_data,
 )
+from .converter import background
 from .html import write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
@@ -56,6 +57,7 @@ from .vega import save
 RUNS_TABLE = "runs.csv"
 
 
+@background.during_page()
 def write_predictions(predictions: Predictions, folder: Path) -> Path:
     """Write all files of predictions into their output folder, result.json last.
 
@@ -157,6 +159,7 @@ def _notes(predictions: Predictions) -> list[Table]:
     return [Table("Notes", header, rows, words, text=tuple(range(1, len(header))))]
 
 
+@background.during_page()
 def write_check(check: Check, folder: Path) -> Path:
     """Write the files of a check of the data before a fit: check.json, figures and report.html.
 
@@ -222,6 +225,7 @@ def _check_warnings(check: Check) -> list[str]:
     return [*lines, *(note.line for note in notes)]
 
 
+@background.during_page()
 def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
     """Write check.json and report.html for a project whose tests are only predicted.
 
@@ -292,6 +296,7 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
     return Exhibit(figures=figures, tables=tables).all_parts()
 
 
+@background.during_page()
 def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
     """Write the page of tests that were run with given cards, notes.csv and result.json.
 
@@ -332,6 +337,7 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
     return page
 
 
+@background.during_page()
 def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[str, Any]:
     """Write tables, figure and page of load cycles, and return the numbers of the tables.
 
@@ -428,6 +434,7 @@ def cycle_table(evaluation: Cycles) -> Table:
     return Table("The cycles", header, rows, note)
 
 
+@background.during_page()
 def write_verification(verification: Verification, folder: Path) -> Path:
     """Write the page of a comparison with published numbers, and result.json.
 
@@ -466,6 +473,7 @@ def write_verification(verification: Verification, folder: Path) -> Path:
     return page
 
 
+@background.during_page()
 def write_constants(
     project: Project, evaluations: Sequence[BiaxialEvaluation], record: Provenance, folder: Path
 ) -> Path:

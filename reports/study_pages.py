@@ -46,6 +46,7 @@ from .charts import (
     spans_a_decade,
 )
 from .content import PageSection, Report, Table, Words, notes_section
+from .converter import background
 from .fit_page import correlation_table
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
@@ -70,6 +71,7 @@ COMPARED = "Fitted: to all points; left out: at what the fits of the folds were 
 Content: TypeAlias = "tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]"
 
 
+@background.during_page()
 def write_study(study: Any, folder: Path) -> Path:
     """Write all files of a study of any type into its output folder, result.json last.
 

@@ -24,7 +24,7 @@ from markupsafe import Markup, escape
 from ..errors import InputError
 from ..storage.writing import TEMPLATES, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
-from .converter import convert
+from .converter import background, convert
 
 if TYPE_CHECKING:
     from ..experiments.data_files import Output
@@ -86,7 +86,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def save(path: Path | str, charts: Charts) -> Path:
-    """Write charts as PNG, SVG or PDF.
+    """Write charts as PNG, SVG or PDF; while a page is put together, beside that.
 
     Parameters
     ----------
@@ -112,10 +112,15 @@ def save(path: Path | str, charts: Charts) -> Path:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(path, "", f"expected a name that ends in {', '.join(SUFFIXES)}")
+    background.begin(_write_drawing, path, charts)
+    return path
+
+
+def _write_drawing(path: Path, charts: Charts) -> None:
+    """Draw charts and write them to a file, in the format of its suffix."""
     content = rendered(charts, path.suffix.lower())
     with replacing(path) as temporary:
         temporary.write_bytes(content)
-    return path
 
 
 def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, str]:

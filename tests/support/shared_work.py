@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 from .paths import ROOT
@@ -79,7 +80,7 @@ class Drawings:
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()}.{kind}"
         if not path.exists():
             drawing = self.convert(kind, spec)
-            complete = path.with_name(f"{path.name}.{os.getpid()}")
+            complete = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
             complete.write_bytes(drawing)
             complete.rename(path)
             return drawing
