@@ -346,8 +346,7 @@ class FormFit:
     @property
     def analyses(self) -> int:
         """Return the number of analyses of the tests in all starts and folds."""
-        starts = sum(r.analyses + r.coarse_analyses for r in self.fit.best.records)
-        return starts + sum(fold.analyses for fold in self.folds)
+        return self.fit.best.analyses + sum(fold.analyses for fold in self.folds)
 
     @property
     def rms(self) -> dict[str, float]:

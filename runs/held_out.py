@@ -44,6 +44,8 @@ class HeldOut:
         The quality of the prediction in the terms of the kind of test, as a fit states it.
     numbers : mapping
         The same as plain values.
+    analyses : int
+        Number of analyses that the prediction took, with those of a fit to the remaining data.
     """
 
     test: str
@@ -53,6 +55,7 @@ class HeldOut:
     notes: tuple[Note, ...] = ()
     words: str = ""
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    analyses: int = 0
 
 
 def held_out(
@@ -99,18 +102,19 @@ def held_out(
     else:
         point = problem.evaluate(with_nuisance(problem, y, nuisance), False, warm=False)
     if point is None:
-        return not_judged(name, f"no analysis: {problem.failure}", units)
+        return not_judged(name, f"no analysis: {problem.failure}", units, problem.analyses)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
     if status == ANALYSES_USED_UP:
         notes += (Note(NOT_CONVERGED, NUISANCE_NOT_CONVERGED.format(problem.analyses), name),)
     rms = errors(problem, point.residual)
     if nuisance is not None:
         norms = np.concatenate(list(problem.norms(point.residual).values()))
-        return HeldOut(name, float(norms.sum()), rms, units, notes)
+        return HeldOut(name, float(norms.sum()), rms, units, notes, analyses=problem.analyses)
     findings = presenter_of(prepared.test.kind).findings(
         prepared, fitted_test(prepared, law, make_solver, problem, point)
     )
-    return HeldOut(name, point.value, rms, units, notes, findings.quality, findings.numbers)
+    words = findings.quality, findings.numbers
+    return HeldOut(name, point.value, rms, units, notes, *words, problem.analyses)
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
@@ -151,9 +155,9 @@ def fitted_test(
     )
 
 
-def not_judged(name: str, reason: str, units: Mapping[str, str]) -> HeldOut:
+def not_judged(name: str, reason: str, units: Mapping[str, str], analyses: int = 0) -> HeldOut:
     """Return the record of a test or part that could not be judged, with the reason."""
-    return HeldOut(name, None, {}, units, (Note(FAILED, reason, name),))
+    return HeldOut(name, None, {}, units, (Note(FAILED, reason, name),), analyses=analyses)
 
 
 UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus held there"

@@ -347,6 +347,11 @@ class BestFit:
         """Return the strains (3,) up to which moduli are fitted; beyond, they are held constant."""
         return np.minimum(pooled_ends(self.law.form, self.reached), self.law.strain_range)
 
+    @property
+    def analyses(self) -> int:
+        """Return the number of analyses of the tests in all starts, on any mesh."""
+        return sum(record.analyses + record.coarse_analyses for record in self.records)
+
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
     """Run the optimum of the best start again from the unloaded state, and return the best fit.

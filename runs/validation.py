@@ -62,6 +62,11 @@ class Judged:
     predicted: HeldOut
     fitted: HeldOut | None = None
 
+    @property
+    def analyses(self) -> int:
+        """Return the number of analyses of the fit to the remaining data and of the judging."""
+        return self.predicted.analyses + (0 if self.fitted is None else self.fitted.analyses)
+
     def rows(self) -> list[dict[str, Any]]:
         """Return the errors as plain values, one row per comparison of the test."""
         predicted = self.predicted
@@ -100,11 +105,19 @@ class Validation(Presented):
         Errors law by law, and for each law test by test or part by part.
     leave : str
         What was left out in turn: "tests", or the sort of parts, such as "frames".
+    analyses_of_all : int
+        Number of analyses that the fits to all data took.
     """
 
     project: Project
     judged: tuple[Judged, ...]
     leave: str = TESTS
+    analyses_of_all: int = 0
+
+    @property
+    def analyses(self) -> int:
+        """Return the number of analyses of the tests in all fits and predictions."""
+        return self.analyses_of_all + sum(judged.analyses for judged in self.judged)
 
     @property
     def means(self) -> dict[str, float]:
@@ -169,6 +182,7 @@ class Validation(Presented):
             "left_out": self.leave,
             "error": "mean relative RMS error of a test, or of its part",
             "mean_foretold": self.means,
+            "analyses": self.analyses,
             "rows": self.table().to_dict("records"),
         }
 
@@ -185,7 +199,7 @@ class Validation(Presented):
         lines += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
             lines.append(f"predicts best: {min(means, key=means.__getitem__)}")
-        return lines
+        return [*lines, f"{self.analyses} analyses of the tests"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,19 +276,20 @@ def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
         Number of random starts, of which the best fit counts.
     """
     units = {name: "" for name in part.masks}
-    masked, unknowns, _ = fit_of(setup, part.masks, starts)
+    masked, unknowns, analyses = fit_of(setup, part.masks, starts)
     if unknowns is None:
-        return not_judged(part.name, NO_FIT, units)
+        return not_judged(part.name, NO_FIT, units, analyses)
     problem = masked.problem(part.masks)
     point = problem.evaluate(unknowns, False, warm=False)
     if point is None:
-        return not_judged(part.name, f"{NO_FIT}: {problem.failure}", units)
+        return not_judged(part.name, f"{NO_FIT}: {problem.failure}", units, analyses)
     law = problem.unknowns.law(masked.law, unknowns)
     # The moduli are known up to the strains of the remaining data only, as those of a card are.
     law = replace(law, strain_range=np.minimum(reached_by(point), law.strain_range))
     nuisance = nuisance_of(problem, unknowns)
     prepared = setup.tests[part.test]
-    return held_out(prepared, law, masked.make_solver, part.alone, nuisance, part.name)
+    at_part = held_out(prepared, law, masked.make_solver, part.alone, nuisance, part.name)
+    return replace(at_part, analyses=analyses + problem.analyses + at_part.analyses)
 
 
 @dataclass(frozen=True)
@@ -410,10 +425,13 @@ def validate(
     folder = _begin(output, list(projects), leave, len(chosen))
     names = [test.name for test in chosen]
     judged = []
+    analyses = 0
     for form, form_project in projects.items():
         fits = FormFits(form, form_project, names, output, listener(progress))
-        judged += fits.judge(omissions[form], leave, starts, folder)
-    return finished(Validation(project, tuple(judged), leave), out)
+        fit_to_all = fits.fit(names, f"{form}: all tests", "all")
+        analyses += fit_to_all.best.analyses
+        judged += fits.judge(fit_to_all, omissions[form], leave, starts, folder)
+    return finished(Validation(project, tuple(judged), leave, analyses), out)
 
 
 def _begin(output: OutputSettings, forms: Sequence[str], leave: str, count: int) -> Path | None:
@@ -478,10 +496,14 @@ class FormFits:
     on_event: Callable[..., None]
 
     def judge(
-        self, omissions: Omissions | None, sort: str, starts: int, folder: Path | None
+        self,
+        fit_to_all: Fit,
+        omissions: Omissions | None,
+        sort: str,
+        starts: int,
+        folder: Path | None,
     ) -> list[Judged]:
-        """Fit all tests, then without each test or part; return the errors at what is left out."""
-        fit_to_all = self._fit(self.names, f"{self.form}: all tests", "all")
+        """Fit without each test or part in turn; return the errors at what is left out."""
         if omissions is None:
             return self.judge_tests(fit_to_all)
         self.on_event(f"{self.form}: without each of {len(omissions.parts)} {sort}")
@@ -495,12 +517,13 @@ class FormFits:
         for number, prepared in enumerate(fit_to_all.setup.tests, start=1):
             omitted = prepared.test.name
             remaining = [name for name in self.names if name != omitted]
-            fit = self._fit(remaining, f"{self.form}: without {omitted}", f"without-{number}")
+            fit = self.fit(remaining, f"{self.form}: without {omitted}", f"without-{number}")
             parameters = nuisance_of(fit.problem, fit.best.point.unknowns)
             predicted = held_out(
                 prepared, fit.reached_law, fit.setup.make_solver, parameters=parameters
             )
             fitted = held_out(prepared, fit_to_all.reached_law, fit_to_all.setup.make_solver)
+            predicted = replace(predicted, analyses=fit.best.analyses + predicted.analyses)
             judged.append(Judged(self.form, predicted, fitted))
         return judged
 
@@ -518,7 +541,7 @@ class FormFits:
             judged.append(Judged(self.form, at_part, fitted))
         return judged
 
-    def _fit(self, tests: Sequence[str], title: str, folder: str) -> Fit:
+    def fit(self, tests: Sequence[str], title: str, folder: str) -> Fit:
         """Fit the named tests, and write the fit below the folder of the study, if any."""
         folder = f"{folder_name(self.form)}-{folder}"
         return fit_in_series(self.project, tests, title, folder, self.output, self.on_event)

@@ -869,6 +869,11 @@ def audit_validate(folder, ledger):
         values = np.array(list(of_tests.values()), dtype=float)
         means[law] = float(np.mean(values))
         ledger.json(("mean_foretold", law), means[law])
+    fits = folder.path.glob("*/result.json")
+    least = sum(json.loads(fit.read_text())["analyses"] for fit in fits)
+    if result["analyses"] < max(1, least):
+        ledger.find("analyses", f"are {result['analyses']}; the fits took {least}")
+    ledger.claim_json("analyses", "consistent")
     for law, mean in means.items():
         if np.isfinite(mean):
             line(ledger, rf"{re.escape(law)}: predicted {N} % on average", [100 * mean], digits=3)

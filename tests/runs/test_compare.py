@@ -25,6 +25,7 @@ from bubblefit.runs.compare import (
 )
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import StudyRecord
+from bubblefit.runs.starts import BestFit
 from bubblefit.solvers.base import SNAP
 
 from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI, constant_strips, fit_setup
@@ -232,7 +233,7 @@ def form(name, coefficients, *folds):
             title="made", fabric=SimpleNamespace(lab="", thickness=0.5)
         ),
         setup=SimpleNamespace(test_names=[], objective_is="error"),
-        best=SimpleNamespace(ranked=[start], records=[start, start]),
+        best=BestFit(None, None, None, ranked=[start], records=[start, start], reached=None),
     )  # fmt: skip
     errors = tuple(
         FoldError(k, value, {} if value is None else {"warp": value / 2, "fill": value / 4})

@@ -137,8 +137,13 @@ def warp_of_two(modulus):
 
 def test_omitted_test_is_predicted_in_closed_form(project, tmp_path, monkeypatch):
     """The fit to "one" has the mean of its specimens' moduli, 330 MPa; "two" has 330 and 410."""
-    told, pages, out = [], [], tmp_path / "out"
-    monkeypatch.setattr(Fit, "report", lambda self, folder: pages.append(Path(folder)))
+    told, fits, pages, out = [], [], [], tmp_path / "out"
+
+    def report(fit, folder):
+        fits.append(fit)
+        pages.append(Path(folder))
+
+    monkeypatch.setattr(Fit, "report", report)
     found = validation.validate(project, starts=1, out=out, progress=told.append)
     words = [event for event in told if isinstance(event, str)]
     assert words == ["constant: all tests", "constant: without one", "constant: without two"]
@@ -157,6 +162,12 @@ def test_omitted_test_is_predicted_in_closed_form(project, tmp_path, monkeypatch
     assert row["fitted_rms"] == pytest.approx(two.fitted.rms["two: warp"])
     mean = json.loads((out / "result.json").read_text())["mean_foretold"]["constant"]
     assert mean == pytest.approx((one.predicted.error + relative) / 2, rel=1e-4)
+    # Of the fits, and one for each test with each of two laws.
+    counted = [fit.best.analyses for fit in fits]
+    assert found.analyses == sum(counted) + 4
+    assert json.loads((out / "result.json").read_text())["analyses"] == found.analyses
+    assert f"{found.analyses} analyses of the tests" in found.lines()
+    assert f"<dt>analyses</dt><dd>{found.analyses}</dd>" in (out / "report.html").read_text()
     folders = ["constant-all", "constant-without-1", "constant-without-2"]
     assert pages == [out / name for name in folders] and all(page.is_dir() for page in pages)
     own = two.predicted.rms["two: warp"]
