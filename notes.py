@@ -11,6 +11,7 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -69,6 +70,15 @@ class Verdict:
     reasons: tuple[str, ...] = ()
     unknown: str = ""
     next_step: str = ""
+
+    def of_study(self, fit: Verdict) -> Verdict:
+        """Return the verdict of a study of a fit; it is not to be used where the fit is not."""
+        if fit.state != "not to be used":
+            return self
+        reason = f"the fit is not to be used: {'; '.join(fit.reasons)}"
+        return replace(
+            self, state=fit.state, reasons=(reason, *self.reasons), next_step=fit.next_step
+        )
 
     @property
     def title(self) -> str:

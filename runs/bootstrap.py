@@ -254,13 +254,14 @@ class Bootstrap(Presented):
         """Return the scatter of the moduli, and whether there were enough units and samples."""
         scatter = [f"{name} {sigma_words(sigma)}" for name, (sigma, _) in self.sigma.items()]
         reasons = tuple(joined_lines(note for note in self.notes if note.kind is FEW_UNITS))
-        return Verdict(
+        verdict = Verdict(
             "usable within limits" if reasons else "usable",
             f"other {self.over} of this sort would move the moduli by {', '.join(scatter)} "
             "(1 sigma)",
             reasons,
             next_step=f"test more {self.over}, or draw more samples (--samples)" if reasons else "",
         )
+        return verdict.of_study(self.optimum.fit_verdict)
 
     @property
     def numbers(self) -> dict[str, Any]:

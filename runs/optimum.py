@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,11 +18,14 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
-from ..notes import SOLVER, Note, NoteKind
+from ..notes import SOLVER, Note, NoteKind, Verdict
 from ..project.project import Project
 from ..solvers.registry import SURROGATE
 from ..wording import distinct_numbers
 from .certainty import with_certainty
+from .check import judge
+from .folder import Provenance
+from .result import Fit
 from .setup import FitSetup, make_solver, prepare_fit
 from .simulation import GivenCard, card_of, card_words
 from .starts import BestFit, StartRecord, best_fit
@@ -127,6 +131,12 @@ class CardOptimum:
         """Return the certainty of the optimum, which is always known here."""
         assert self.best.certainty is not None
         return self.best.certainty
+
+    @cached_property
+    def fit_verdict(self) -> Verdict:
+        """Return the verdict of the fit, as its own page states it."""
+        record = Provenance(self.setup.project.path, None, None, (), {}, ())
+        return Fit(self.setup, self.problem, self.best, 0.0, record, judge(self.setup)).verdict
 
     @property
     def posterior(self) -> Posterior:

@@ -31,7 +31,7 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, Verdict
+from ..notes import Note, State, Verdict
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -127,6 +127,8 @@ class Plan(Presented):
         The uncertainty with the present tests alone.
     candidates : sequence of Prospect
         The uncertainty with one more test, for each candidate, best first.
+    fit_verdict : Verdict
+        The verdict of the fit to the present tests.
     following : Prospect or None
         The best second test once the first of `candidates` has been made.
     notes : sequence of Note
@@ -139,6 +141,7 @@ class Plan(Presented):
     rank: str
     present: Prospect
     candidates: Sequence[Prospect]
+    fit_verdict: Verdict
     following: Prospect | None = None
     notes: Sequence[Note] = ()
 
@@ -190,13 +193,17 @@ class Plan(Presented):
         best = self.candidates[0]
         sigmas = [f"{name} {words}" for name, words in best.words.items() if words != UNKNOWN]
         unknown = [name for name, words in best.words.items() if words == UNKNOWN]
-        return Verdict(
+        verdict = Verdict(
             "usable within limits" if unknown else "usable",
             f"the best next test is {best.title}: it would leave {', '.join(sigmas) or 'nothing'}"
             " (1 sigma)",
             unknown=f"{', '.join(unknown)} even with that test" if unknown else "",
             next_step="make that test, add it to the project and fit again",
         )
+        # A further test may be what makes the fit usable.
+        of_study = verdict.of_study(self.fit_verdict)
+        state: State = "usable within limits" if of_study.reasons else verdict.state
+        return replace(of_study, state=state, next_step=verdict.next_step)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -363,6 +370,7 @@ def plan(
         present=Prospect("now", "", 1, "", query.moduli()),
         candidates=[addition.prospect for addition in additions],
         following=min(following, key=lambda prospect: prospect.order(rank)),
+        fit_verdict=optimum.fit_verdict,
         notes=notes,
     )
     return finished(result, out)

@@ -250,6 +250,8 @@ class Profiles(Presented):
     profiles : sequence of Profile
     analyses : int
         Number of analyses of all profiles, and of finding the optimum.
+    fit_verdict : Verdict
+        The verdict of the fit.
     notes : sequence of Note
     """
 
@@ -258,6 +260,7 @@ class Profiles(Presented):
     tests: Sequence[str]
     profiles: Sequence[Profile]
     analyses: int
+    fit_verdict: Verdict
     notes: Sequence[Note] = ()
 
     def table(self) -> pd.DataFrame:
@@ -295,9 +298,11 @@ class Profiles(Presented):
             step = "fit again with more starts"
         if not intervals:
             words = "no interval has two ends"
-            return Verdict("not to be used", words, doubts, unknown, step)
-        state: State = "usable within limits" if step else "usable"
-        return Verdict(state, ", ".join(intervals), doubts, unknown, step)
+            verdict = Verdict("not to be used", words, doubts, unknown, step)
+        else:
+            state: State = "usable within limits" if step else "usable"
+            verdict = Verdict(state, ", ".join(intervals), doubts, unknown, step)
+        return verdict.of_study(self.fit_verdict)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -397,7 +402,8 @@ def profile(
     for item in profiles:
         notes += item.notes
     names = optimum.setup.test_names
-    return finished(Profiles(project, optimum.card, names, profiles, analyses, notes), out)
+    result = Profiles(project, optimum.card, names, profiles, analyses, optimum.fit_verdict, notes)
+    return finished(result, out)
 
 
 def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:

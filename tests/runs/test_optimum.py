@@ -1,13 +1,15 @@
 """The optimum of a study's card: bounds of the project, and what studies refuse."""
 
+import bubblefit
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import Verdict
 from bubblefit.project.project import read_project
 from bubblefit.runs.bootstrap import bootstrap
-from bubblefit.runs.optimum import find_optimum
+from bubblefit.runs.optimum import CardOptimum, find_optimum
 from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import profile
 from bubblefit.runs.refinement import vary_nu12
@@ -47,6 +49,34 @@ BAD = [
 @pytest.mark.parametrize(("study", "given", "said"), BAD)
 def test_impossible_settings_of_studies_are_refused(project, study, given, said):
     raised(InputError, said, study, project, **given)
+
+
+def test_study_of_a_fit_not_to_be_used_says_so_at_its_top(project, tmp_path, monkeypatch):
+    fit = Verdict("not to be used", "it is off", ("it is off",), next_step="measure again")
+    monkeypatch.setattr(CardOptimum, "fit_verdict", fit)
+    reason = "the fit is not to be used: it is off"
+    for study, given in (
+        (bootstrap, OVER | {"samples": 2}),
+        (profile, {"card": PROFILED, "moduli": {"E1": [0.05]}}),
+        (plan, {"card": CARD}),
+    ):
+        out = tmp_path / study.__name__
+        result = study(project, **given, out=out)
+        verdict = result.verdict
+        plans = study is plan  # of a further test, by which the fit may become usable
+        state = "usable within limits" if plans else "not to be used"
+        assert (verdict.state, verdict.reasons[0]) == (state, reason)
+        assert result.result["verdict"]["reasons"] == list(verdict.reasons)
+        assert " ".join(result.lines()).count(reason) == 1
+        page = (out / "report.html").read_text()
+        assert page.count(reason) == 1 and page.index(reason) < page.index("<h2")
+        assert (verdict.next_step == "measure again") != plans
+
+
+def test_verdict_of_the_fit_in_a_study_is_that_of_its_own_page(project):
+    fit = bubblefit.fit(project, "one", starts=1)
+    optimum = find_optimum(project, fit.card, "one")
+    assert optimum.fit_verdict == fit.verdict
 
 
 #: Bounds on coefficients (GPa): G12, E2, E1.
