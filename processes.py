@@ -1,13 +1,17 @@
-"""Processes and threads: starting workers, limiting the threads of BLAS, time limits of calls."""
+"""Processes and threads: starting workers, tasks side by side, threads of BLAS, time limits."""
+
+from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
+M = TypeVar("M")
 V = TypeVar("V")
 
 
@@ -43,6 +47,162 @@ def share_cores(processes: int) -> None:
 def share_of_cores() -> int:
     """Return the number of cores that this process may use for itself, 1 or more."""
     return max(1, cores() // _processes_at_once.get())
+
+
+class _Scope:
+    """A block in which tasks may run in several processes at once, and the copies made in it."""
+
+    def __init__(self, processes: int) -> None:
+        self.processes = max(1, processes)
+        self.copies: Copies[Any, Any] | None = None
+
+    def end_copies(self) -> None:
+        """End the copies that there are."""
+        if self.copies is not None:
+            self.copies.end()
+            self.copies = None
+
+
+_scope: ContextVar[_Scope | None] = ContextVar("processes_at_once_of_tasks", default=None)
+
+
+@contextmanager
+def may_run_at_once(processes: int) -> Iterator[None]:
+    """Let tasks in the block run in so many processes at once, this one counted (`Copies`)."""
+    scope = _Scope(processes)
+    with temporary_value(_scope, scope):
+        try:
+            yield
+        finally:
+            scope.end_copies()
+
+
+class Copies(Generic[M, V]):
+    """Copies of this process that share tasks with it, as often as it asks them to.
+
+    Nothing that a task does in a copy reaches this process but what it returns. The copies end with
+    the block that allows them (`may_run_at_once`), or when others are made in it.
+
+    Parameters
+    ----------
+    do : callable
+        Does the task of a number by a message; both message and result can be pickled.
+    shares : sequence of sequence of int
+        The numbers of each process, this one first.
+    """
+
+    def __init__(self, do: Callable[[int, M], V], shares: Sequence[Sequence[int]]) -> None:
+        self._do = do
+        self._own_share, *others = self._shares = shares
+        self._owner = os.getpid()
+        self._copies = [(_Copy(do), share) for share in others]
+
+    @property
+    def exist(self) -> bool:
+        """Return whether the copies can still be asked; those of another process cannot."""
+        return bool(self._copies) and self._owner == os.getpid()
+
+    def run(self, messages: Sequence[M]) -> list[V]:
+        """Return the results of all tasks, each by its message.
+
+        A task whose copy has died is done here.
+        """
+        for copy, share in self._copies:
+            copy.send([(k, messages[k]) for k in share])
+        results = {k: self._do(k, messages[k]) for k in self._own_share}
+        for copy, share in self._copies:
+            values = copy.receive()
+            if values is None:
+                values = [self._do(k, messages[k]) for k in share]
+            results |= zip(share, values, strict=True)
+        return [results[k] for k in range(len(messages))]
+
+    def is_balanced(self, seconds: Sequence[float]) -> bool:
+        """Return whether another way to share tasks, which take so long, would save little."""
+        shares = _shares(seconds, len(self._shares))
+        longest, shortest = (
+            max(sum(seconds[k] for k in share) for share in by) for by in (self._shares, shares)
+        )
+        return longest <= 1.25 * shortest
+
+    def end(self) -> None:
+        """End all copies."""
+        for copy, _ in self._copies:
+            copy.end()
+        self._copies = []
+
+
+def copies_for(do: Callable[[int, M], V], seconds: Sequence[float]) -> Copies[M, V] | None:
+    """Return copies of this process for tasks, None where they may not be made or save no time.
+
+    Parameters
+    ----------
+    do : callable
+        See `Copies`.
+    seconds : sequence of float
+        How long each task takes: the longest are shared out first.
+    """
+    scope = _scope.get()
+    if scope is None or process_context().get_start_method() != "fork":
+        return None
+    shares = _shares(seconds, scope.processes)
+    if len(shares) < 2:
+        return None
+    scope.end_copies()
+    scope.copies = Copies(do, shares)
+    return scope.copies
+
+
+def _shares(seconds: Sequence[float], processes: int, *, least: float = 0.01) -> list[list[int]]:
+    """Share tasks out among processes, of which each has `least` seconds to do, or one has all."""
+    shares: list[list[int]] = [[] for _ in range(processes)]
+    loads = [0.0] * processes
+    for k in sorted(range(len(seconds)), key=lambda k: -seconds[k]):
+        free = loads.index(min(loads))
+        shares[free].append(k)
+        loads[free] += seconds[k]
+    if processes > 1 and min(loads) < least:
+        return _shares(seconds, processes - 1, least=least)
+    return shares
+
+
+class _Copy:
+    """A copy of this process, and the pipe to it."""
+
+    def __init__(self, do: Callable[[int, Any], Any]) -> None:
+        import multiprocessing
+
+        self._connection, connection = multiprocessing.Pipe()
+        self._number = os.fork()
+        if self._number == 0:
+            self._connection.close()
+            try:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process copied decides
+                signal.signal(signal.SIGTERM, signal.SIG_DFL)
+                while True:
+                    connection.send([do(k, message) for k, message in connection.recv()])
+            finally:
+                os._exit(0)  # nothing else of the process copied is run
+        connection.close()
+
+    def send(self, tasks: Sequence[tuple[int, Any]]) -> None:
+        """Send tasks, unless the copy has died."""
+        with suppress(OSError):
+            self._connection.send(tasks)
+
+    def receive(self) -> list[Any] | None:
+        """Return the results of the tasks, None if the copy has died."""
+        try:
+            return self._connection.recv()
+        except (EOFError, OSError):
+            return None
+
+    def end(self) -> None:
+        """End the copy, unless it is that of another process."""
+        self._connection.close()
+        with suppress(OSError):
+            os.kill(self._number, signal.SIGKILL)
+            os.waitpid(self._number, 0)
 
 
 #: Environment variables by which a user limits threads; if one is set, it is left as it is.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
@@ -148,6 +148,17 @@ class LearningSolver(Protocol):
         """Drop what was learnt."""
 
 
+class ComparisonState(NamedTuple):
+    """What analyses change of a comparison."""
+
+    warm_start: WarmStart | None
+    objective: Objective
+
+    def is_same(self, other: ComparisonState) -> bool:
+        """Return whether both have the same objects."""
+        return self.warm_start is other.warm_start and self.objective is other.objective
+
+
 @dataclass(eq=False)
 class Comparison:
     """A model that should show what was measured, with the solver that runs it.
@@ -177,6 +188,10 @@ class Comparison:
         What leads the fit by its derivatives in place of the solver.
     shared_errors : callable, optional
         See `SharedErrors`; None where each value errs alone, or with its neighbours.
+    warm_start : WarmStart, optional
+        The last solution with derivatives.
+    seconds : float
+        Processor time of the last run; 0 before the first.
     """
 
     name: str
@@ -190,11 +205,26 @@ class Comparison:
     prolong: Callable[[Array], Array] | None = None
     shared_errors: SharedErrors | None = None
     surrogate: Solver | None = None
-    _warm_start: WarmStart | None = field(default=None, repr=False)
+    warm_start: WarmStart | None = field(default=None, repr=False)
+    seconds: float = 0.0
+
+    @property
+    def state(self) -> ComparisonState:
+        """Return what analyses change of it."""
+        return ComparisonState(self.warm_start, self.objective)
+
+    @state.setter
+    def state(self, state: ComparisonState) -> None:
+        self.warm_start, self.objective = state
+
+    @property
+    def may_run_aside(self) -> bool:
+        """Return whether a copy of this process may run the model: its solver learns nothing."""
+        return not (self.solver.external or isinstance(self.solver, LearningSolver))
 
     def forget(self) -> None:
         """Drop the warm start until the next differentiated run."""
-        self._warm_start = None
+        self.warm_start = None
         if isinstance(self.solver, LearningSolver):
             self.solver.forget()
 
@@ -272,7 +302,7 @@ class Comparison:
             guess=self._guess(parameters) if warm else None,
         )
         if history.path is not None and history.path_slope is not None:
-            self._warm_start = WarmStart(parameters, history.path, history.path_slope)
+            self.warm_start = WarmStart(parameters, history.path, history.path_slope)
         by_parameter = self.objective.at(nuisance).jacobian(history, slope)
         by_nuisance = self._nuisance_columns(by_parameter[:, len(free) :], nuisance, history)
         return history, np.column_stack([by_parameter[:, : len(free)], *by_nuisance])
@@ -334,4 +364,4 @@ class Comparison:
 
     def _guess(self, parameters: Array) -> Array | None:
         """Return the path that the last run suggests at parameters (p,); None if there was none."""
-        return None if self._warm_start is None else self._warm_start.guess(parameters)
+        return None if self.warm_start is None else self.warm_start.guess(parameters)

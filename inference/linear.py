@@ -24,6 +24,7 @@ from ..errors import SolverFailure
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
+from ..processes import copies_for
 from ..solvers.base import History
 from .comparison import Comparison
 from .descent import MIN_BLOCK_NORM, bounded_step, with_small_diagonal
@@ -269,17 +270,34 @@ def residual_of(
     names = [comparison.name for comparison in problem.comparisons]
     # Where derivatives alone are known, there is no history.
     coarse_runs = dict(zip(names, best.histories, strict=False))
-    residuals = []
-    for comparison in comparisons:
+
+    def residual_at(number: int, _: None = None) -> Array | SolverFailure:
+        comparison = comparisons[number]
         nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
         coarse_run = coarse_runs.get(comparison.name)
-        history = comparison.run(law, unknowns.free, nuisance, False, coarse_run)
-        residuals.append(comparison.objective.residual(history, nuisance))
+        try:
+            history = comparison.run(law, unknowns.free, nuisance, False, coarse_run)
+        except SolverFailure as failure:
+            return failure
+        return comparison.objective.residual(history, nuisance)
+
+    copies = None
+    if all(comparison.may_run_aside for comparison in comparisons):
+        # Finer models take as long as the others do, in proportion.
+        seconds = {comparison.name: comparison.seconds for comparison in problem.comparisons}
+        copies = copies_for(residual_at, [seconds.get(c.name, 0.0) for c in comparisons])
+    count = len(comparisons)
+    runs = map(residual_at, range(count)) if copies is None else copies.run([None] * count)
+    residuals = []
+    for run in runs:
+        if isinstance(run, SolverFailure):
+            raise run
+        residuals.append(run)
     residual = np.concatenate(residuals)
-    count = sum(sum(comparison.objective.sizes) for comparison in problem.comparisons)
-    if residual.shape != (count,) or not np.isfinite(residual).all():
+    size = sum(sum(comparison.objective.sizes) for comparison in problem.comparisons)
+    if residual.shape != (size,) or not np.isfinite(residual).all():
         raise SolverFailure("the finer model does not give what was matched", problem.solver.name)
-    return np.concatenate([residual, best.residual[count:]])  # priors are of the unknowns
+    return np.concatenate([residual, best.residual[size:]])  # priors are of the unknowns
 
 
 def limit_of(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -11,8 +12,9 @@ import numpy as np
 from ..errors import InputError, SolverFailure
 from ..materials.forms.base import SHEAR, Array
 from ..materials.law import HypoelasticLaw
+from ..processes import Copies, copies_for
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
-from .comparison import Comparison, LearningSolver
+from .comparison import Comparison, ComparisonState, LearningSolver, WarmStart
 from .objective import Blocks
 from .unknowns import Unknowns
 
@@ -74,11 +76,87 @@ Watch = Callable[[Array, float | None, str, str], None]
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A run of one comparison: residual (m,), and slopes (m, unknowns) if it was differentiated."""
+    """A run of one comparison: residual (m,), and slopes (m, unknowns) if it was differentiated.
+
+    With where the next run may start, and the processor time that this one took.
+    """
 
     history: History
     residual: Array
     jacobian: Array | None
+    warm_start: WarmStart | None = None
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Analysis:
+    """What a process needs to run a comparison.
+
+    Attributes
+    ----------
+    unknowns : (unknowns,) array
+    with_jacobian, warm : bool
+        See `FitProblem.evaluate`.
+    state : ComparisonState, optional
+        That of the comparison, where a copy of this process has another one.
+    """
+
+    unknowns: Array
+    with_jacobian: bool
+    warm: bool
+    state: ComparisonState | None = None
+
+
+class _Team:
+    """Copies of this process that run comparisons of a problem beside it.
+
+    Each process has the warm starts and objectives of its comparisons; where these are others in
+    this process by now, a copy is sent them with its next analysis.
+    """
+
+    def __init__(
+        self,
+        comparisons: Sequence[Comparison],
+        copies: Copies[_Analysis, _Run | SolverFailure],
+    ) -> None:
+        self.comparisons = comparisons
+        self.copies = copies
+        self.states = [comparison.state for comparison in comparisons]
+
+    @classmethod
+    def of(
+        cls,
+        comparisons: Sequence[Comparison],
+        run: Callable[[int, _Analysis], _Run | SolverFailure],
+    ) -> _Team | None:
+        """Return copies for comparisons that have run once; None where they are not allowed."""
+        if not all(comparison.seconds and comparison.may_run_aside for comparison in comparisons):
+            return None
+        copies = copies_for(run, [comparison.seconds for comparison in comparisons])
+        return None if copies is None else cls(comparisons, copies)
+
+    def run(self, analysis: _Analysis) -> list[_Run | SolverFailure]:
+        """Run all comparisons; one behind a failure is left as if it had not run."""
+        before = [comparison.state for comparison in self.comparisons]
+        messages = [
+            replace(analysis, state=None if own.is_same(known) else own)
+            for own, known in zip(before, self.states, strict=True)
+        ]
+        runs = self.copies.run(messages)
+        has_failed = False
+        for k, (comparison, run) in enumerate(zip(self.comparisons, runs, strict=True)):
+            comparison.state = self.states[k] = before[k]
+            if isinstance(run, SolverFailure):
+                has_failed = True
+                continue
+            if analysis.with_jacobian:
+                self.states[k] = before[k]._replace(warm_start=run.warm_start)
+            if not has_failed:
+                comparison.state = self.states[k]
+                comparison.seconds = run.seconds
+        if not self.copies.is_balanced([comparison.seconds for comparison in self.comparisons]):
+            self.copies.end()  # the next analysis makes others
+        return runs
 
 
 class Starts(Protocol):
@@ -152,6 +230,7 @@ class FitProblem:
     failure: str = ""
     warm_starts: bool = True
     blocks: Blocks = field(init=False, repr=False)
+    _team: _Team | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         names = [comparison.name for comparison in self.comparisons]
@@ -263,7 +342,7 @@ class FitProblem:
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
         """Return the same problem with other solvers, one for each comparison, as a surrogate."""
         comparisons = tuple(
-            replace(comparison, solver=solver, _warm_start=None)
+            replace(comparison, solver=solver, warm_start=None)
             for comparison, solver in zip(self.comparisons, solvers, strict=True)
         )
         return FitProblem(comparisons, self.law, self.unknowns)
@@ -317,22 +396,52 @@ class FitProblem:
         """
         self.analyses += 1
         law = self.unknowns.law(self.law, y)
-        warm = warm and self.warm_starts
         runs = []
-        for comparison in self.comparisons:
-            try:
-                runs.append(self._run(comparison, law, y, with_jacobian, warm))
-            except SolverFailure as failure:
+        for comparison, run in zip(
+            self.comparisons,
+            self._results(y, with_jacobian, warm and self.warm_starts),
+            strict=False,
+        ):
+            if isinstance(run, SolverFailure):
                 prefix = f"{comparison.name}: " if len(self.comparisons) > 1 else ""
-                self.failure = prefix + failure.line
+                self.failure = prefix + run.line
                 self._report(y, None, self.failure)
                 return None
+            runs.append(run)
         evaluation = self._evaluation(y, law, runs)
         if not evaluation.stable:
             self.last_unstable = self.analyses
         self.cached += evaluation.from_cache
         self._report(y, evaluation.value, evaluation.status)
         return evaluation
+
+    def _results(self, y: Array, with_jacobian: bool, warm: bool) -> Iterable[_Run | SolverFailure]:
+        """Return the runs of the comparisons, side by side from the second analysis on.
+
+        The first tells how long each takes, and finds what later ones share: patterns of matrices.
+        """
+        analysis = _Analysis(y, with_jacobian, warm)
+        if self._team is None or not self._team.copies.exist:
+            self._team = _Team.of(self.comparisons, self._run_of)
+        if self._team is None:
+            return (self._run_of(k, analysis) for k in range(len(self.comparisons)))
+        return self._team.run(analysis)
+
+    def _run_of(self, number: int, analysis: _Analysis) -> _Run | SolverFailure:
+        """Run the comparison `number` (from 0), in this process or in a copy of it."""
+        comparison = self.comparisons[number]
+        if analysis.state is not None:
+            comparison.state = analysis.state
+        y = analysis.unknowns
+        law = self.unknowns.law(self.law, y)
+        start = time.process_time()
+        try:
+            run = self._run(comparison, law, y, analysis.with_jacobian, analysis.warm)
+        except SolverFailure as failure:
+            return failure
+        comparison.seconds = time.process_time() - start
+        warm_start = comparison.warm_start if analysis.with_jacobian else None
+        return replace(run, warm_start=warm_start, seconds=comparison.seconds)
 
     def _run(
         self,

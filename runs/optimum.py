@@ -19,6 +19,7 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..notes import SOLVER, Note, NoteKind, Verdict
+from ..processes import cores, may_run_at_once
 from ..project.project import Project
 from ..solvers.registry import SURROGATE
 from ..wording import distinct_numbers
@@ -195,8 +196,9 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     setup = prepare_fit(project, project.chosen(tests, fitted=True))
     problem = setup.problem()
     start = unknowns_of_card(setup, problem, material)
-    record = descend_from(problem, start, project.fit.tolerance, project.fit.seed)
-    best = with_certainty(setup, problem, best_fit(problem, [record], project.fit.tolerance))
+    with may_run_at_once(project.fit.jobs or cores()):
+        record = descend_from(problem, start, project.fit.tolerance, project.fit.seed)
+        best = with_certainty(setup, problem, best_fit(problem, [record], project.fit.tolerance))
     notes += notes_of_distance(best, material.law)
     return CardOptimum(setup, problem, best, card_words(card), record.analyses + 1, tuple(notes))
 

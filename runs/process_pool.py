@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
 from ..lazy_modules import psutil
-from ..processes import process_context, share_cores
+from ..processes import may_run_at_once, process_context, share_cores
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.scratch import remove_interrupted, sweep_left
 
@@ -97,7 +97,8 @@ class ProcessPool:
 
     def start_worker(self) -> None:
         """Start a process, and give it a task."""
-        worker = Worker(self.context, self.prepare, min(self.jobs, max(self.unfinished, 1)))
+        processes = min(self.jobs, max(self.unfinished, 1))
+        worker = Worker(self.context, self.prepare, processes, self.jobs // processes)
         self.workers.append(worker)
         self.give_task(worker)
 
@@ -178,13 +179,15 @@ class TaskEnd:
 class Worker:
     """A process that does tasks one by one, and the pipe to it."""
 
-    def __init__(self, context: Any, prepare: Callable[[], Task], processes: int) -> None:
+    def __init__(
+        self, context: Any, prepare: Callable[[], Task], processes: int, at_once: int
+    ) -> None:
         self.connection, worker_end = context.Pipe()
         self.task: int | None = None
         content: Any = prepare
         if context.get_start_method() != "fork":
             content = cloudpickle.dumps(prepare)
-        arguments = (content, worker_end, os.getpid(), processes)
+        arguments = (content, worker_end, os.getpid(), processes, at_once)
         self.process = context.Process(target=_work, args=arguments, daemon=True)
         self.process.start()
         worker_end.close()  # the worker alone has it: where that dies, reading ends
@@ -199,15 +202,21 @@ class Worker:
 # In the processes --------------------------------------------------------------------------------
 
 
-def _work(prepare: Any, listener: connection.Connection, parent: int, processes: int) -> None:
-    """Do tasks until there is none; the function of one of so many processes."""
+def _work(
+    prepare: Any, listener: connection.Connection, parent: int, processes: int, at_once: int
+) -> None:
+    """Do tasks until there is none; the function of one of so many processes.
+
+    `at_once` : number of processes in which it may do a task, itself counted.
+    """
     share_cores(processes)
     # Ctrl-C reaches the whole group; the parent decides and terminates us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_by_exception)
     threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
     try:
-        _do_tasks(prepare, listener)
+        with may_run_at_once(at_once):
+            _do_tasks(prepare, listener)
     except SystemExit:
         # Nothing else of a copy of the parent is run: the end is an end at once.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -1,8 +1,10 @@
 """inference/problem.py: residuals and derivatives of a fit of one or several comparisons."""
 
+import numpy as np
 import pytest
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import Unknowns
+from bubblefit.processes import may_run_at_once
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..support.refusals import complaint
@@ -46,6 +48,44 @@ def test_watch_hears_of_every_analysis_with_its_status():
     assert fit.evaluate(y, False) is None
     assert len(heard) == fit.analyses == 2
     assert heard[0][1] == "ok" and heard[1] == (None, "on purpose")
+
+
+def test_comparisons_side_by_side_give_what_they_give_one_after_the_other():
+    """With warm starts, after a failure of the first, a change of the data, and from anew."""
+
+    def analyses(processes):
+        fit = two_bubbles()
+        first, second = fit.comparisons
+        first.solver = Failing(lambda run: run == 4)
+        first.seconds = second.seconds = 1.0  # so that they run side by side from the beginning
+        y = fit.unknowns.at(LAW.beta * 1.02)
+        y[12:] = [0.5, 1.5, -0.3, -2.0]
+        with may_run_at_once(processes):
+            points = [fit.evaluate(y * factor, True) for factor in (1, 1.001, 1.003, 1.004, 1.005)]
+            points.append(fit.evaluate(y * 1.006, False))
+            pair = points[4].histories[1], points[5].histories[1]
+            second.objective = second.objective.shifted(*pair)
+            points.append(fit.evaluate(y * 1.007, True))
+            fit.reset()
+            points.append(fit.evaluate(y * 1.008, True))
+            assert (fit._team is not None) == (processes > 1)
+        assert first.warm_start is not None and second.warm_start is not None
+        return fit, points
+
+    (one, alone), (other, together) = analyses(1), analyses(2)
+    assert [point is None for point in alone] == [k == 3 for k in range(8)]
+    for a, b in zip(alone, together, strict=True):
+        if a is None:
+            assert b is None
+            continue
+        assert a.value == b.value and a.stable == b.stable
+        np.testing.assert_array_equal(a.residual, b.residual)
+        np.testing.assert_array_equal(a.jacobian, b.jacobian)
+        for of_a, of_b in zip(a.histories, b.histories, strict=True):
+            np.testing.assert_array_equal(of_a.displacement, of_b.displacement)
+    assert one.failure == other.failure and one.analyses == other.analyses
+    for a, b in zip(one.comparisons, other.comparisons, strict=True):
+        np.testing.assert_array_equal(a.warm_start.path, b.warm_start.path)
 
 
 def test_jacobian_of_two_bubbles_with_nuisance_against_differences():
