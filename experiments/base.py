@@ -70,7 +70,10 @@ class BaseTest(Protocol):
 
     @property
     def conditioning(self) -> str | None:
-        """Return the words for the conditioning of the fabric before the test."""
+        """Return the user's words for the conditioning before the test, None where there are none.
+
+        A card takes over `state` only if a test has such words.
+        """
         return None
 
     @property

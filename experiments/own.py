@@ -62,7 +62,8 @@ class OwnTest(BaseTest):
     thickness: float = 1.0
     kind = "own"
     parameters = ("thickness",)
-    # Attributes, which a subclass may assign, instead of the properties of `BaseTest`.
+    # Attributes, which a subclass may assign, instead of the properties of `BaseTest`. A card
+    # takes over `state` only beside `conditioning`, its words.
     state: State = ""
     conditioning: str | None = None
     pace: Pace | None = None

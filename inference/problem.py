@@ -246,9 +246,9 @@ class FitProblem:
         prior_count = len(self.unknowns.nuisance.priors[0])
         sizes += [prior_count] if prior_count else []
         self.blocks = Blocks(sizes)
-        # `_norms_of_equal_weights` needs the blocks, first without those norms.
+        # `_least_norms` needs the blocks, first without those norms.
         if self._weighs_by_noise:
-            self.blocks = Blocks(sizes, self._norms_of_equal_weights)
+            self.blocks = Blocks(sizes, self._least_norms)
 
     @property
     def solver(self) -> Solver:
@@ -307,10 +307,11 @@ class FitProblem:
         return not has_fields and any(objective.weighs_by_noise for objective in objectives)
 
     @property
-    def _norms_of_equal_weights(self) -> Array:
-        """Return norms of blocks (blocks,) up to which a squared residual weighs by its noise.
+    def _least_norms(self) -> Array:
+        """Return the `Blocks.least_norms` (blocks,) of a fit that weighs its data by their noise.
 
-        They are as the squares of the noise, and ten times that of each block at least.
+        They are proportional to the mean squared noise of each block, so that all squared
+        residuals weigh by it, and `WEIGHED_BY_NOISE` times the norm of its noise at least.
         """
         noise = [
             np.full(sum(comparison.objective.sizes), comparison.objective.least_noise)

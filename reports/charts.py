@@ -1,5 +1,6 @@
 """Charts as plain data, which `vega` draws on the page and as files.
 
+Their fields are the layout of page.json: who changes it raises `content.LAYOUT`.
 The classes and functions up to `axis_ends` serve charts of any kind; those after it draw tangent
 moduli over strain: of fits, with their bands, and with their uncertainty by test.
 """
@@ -147,13 +148,16 @@ class Charts:
     Attributes
     ----------
     name : str
-        Name that tells the figure from others, such as "moduli".
+        Name that tells the figure from others of its page, such as "moduli"; pages that are shown
+        side by side merge figures of the same name.
     charts : sequence of Chart
         Charts in the order in which they are shown.
     caption : str
         Text below the figure.
     columns : int
         Number of charts in a row of a file; 0 for up to three.
+    part : "charts"
+        Names the class in page.json.
     """
 
     name: str

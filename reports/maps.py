@@ -258,7 +258,8 @@ def maps_of(
     counts = [len(of_load[::step]) for of_load, step in zip(places, steps, strict=True)]
     if max(steps) > 1:
         caption += f" Of the places one in {max(steps)} is shown."
-    return Maps(name, loads, slider, counts, pack(thin(places)), panels, *labels, caption, alt)
+    points = pack(thin(places))
+    return Maps(name, loads, slider, counts, points, panels, *labels, caption=caption, alt=alt)
 
 
 def frame_of(maps: Maps, values: Array, load: int) -> Array:

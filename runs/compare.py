@@ -605,7 +605,7 @@ def compare(
 
 
 def _coarse_to_fine(setup: FitSetup) -> Project:
-    """Return the project of a fit whose starts run coarse to fine if they can, unless it says how.
+    """Return the project of a fit, with starts coarse to fine if it does not say how and they can.
 
     A comparison takes the best optimum of each form; how many starts agree on it is secondary.
     """

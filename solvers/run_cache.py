@@ -111,7 +111,7 @@ class RunCache:
 
     @property
     def limit(self) -> int:
-        """Return the bytes beyond which runs go: the folder's own limit, else `LIMIT`."""
+        """Return the largest size of all runs in bytes: the limit in the folder, else `LIMIT`."""
         with suppress(OSError, ValueError):
             return max(0, int((self.folder / LIMIT_FILE).read_text(encoding="ascii")))
         return LIMIT

@@ -428,6 +428,7 @@ def _check_inflations(
         "sheet.rim": section.sheet.rim == "measured",
     }
     for key, is_set in keys_of_one_inflation.items():
+        # The pressures of one inflation rise; they fall where a release is taken, too.
         if is_set and list(pressures) != sorted(pressures):
             raise place.error(key, "is of one inflation, and inflation = 'all' takes several")
     if not is_measured and section.inflation != 1:

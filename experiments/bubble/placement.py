@@ -241,7 +241,7 @@ def without_motion(frame: Frame, motion: RigidMotion) -> Frame:
     return replace(frame, displacement=displacement)
 
 
-#: Positions (n, 2) mm in the plane of the sheet, and rises (n,) mm.
+#: Positions (n, 2) mm in the plane of the sheet, and rises (n,): mm, or shares where it is said.
 RiseSurface = tuple[Array, Array]
 #: First and second semi-axis of the rim, mm; equal for a circle.
 SemiAxes = tuple[float, float]
@@ -440,6 +440,7 @@ def _fit_outline(
     Parameters
     ----------
     surfaces : sequence of RiseSurface
+        Rises as shares of the largest of each image.
     terms : callable
         Returns, for points (n, 2) and an outline (unknowns,), the terms (n, k) whose linear
         combination is to follow the rises.
@@ -461,8 +462,9 @@ def _fit_outline(
 def _outline_residual(
     outline: Array, surfaces: Sequence[RiseSurface], terms: Callable[[Array, Array], Array]
 ) -> Array:
-    """Return the rises less the best linear combination of the terms of an outline, by image.
+    """Return the rises less the best linear combination of the terms of an outline, as one array.
 
+    Images follow each other, and rises are as shares of the largest of each.
     The amplitudes are found for each image alone, by projection (variable projection).
 
     Parameters

@@ -193,9 +193,10 @@ def register(
     InputError
         Nothing moves in the last image, or a step cannot be found and must be given.
     """
-    reference = frames[-1]
-    up = _rising_direction(reference)
-    placement, _ = plane_through(reference.points, up)
+    highest = frames[-1]
+    up = _rising_direction(highest)
+    # A first plane, through all points, is enough to find the centre.
+    placement, _ = plane_through(highest.points, up)
     if options.plane == "camera":
         # The camera's axes; turned about x where the sheet rises away from its z.
         signs = [1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0]
@@ -206,9 +207,9 @@ def register(
     if options.plane != "camera":
         # Which points lie on the clamp, or at the edge, is known once there is a centre.
         outline = Outline(*semi_axes, _rim_angle(placement, rim, options))
-        positions = placement.coordinates(reference.points)
+        positions = placement.coordinates(highest.points)
         is_on_plane, plane_of = _plane_points(positions, outline, options)
-        placement, flatness = plane_through(reference.points[is_on_plane], up)
+        placement, flatness = plane_through(highest.points[is_on_plane], up)
         placement, rim = _centred(frames, placement, semi_axes, options)
     outline = Outline(*semi_axes, _rim_angle(placement, rim, options))
     centred_frames, motions = _without_clamp_motion(placement.transformed(frames), outline, options)
@@ -469,7 +470,7 @@ def clamp_radius(
     Parameters
     ----------
     fields : sequence of DisplacementField
-        Fields by rising pressure.
+        Fields in any order, as several inflations and releases have them.
     options : RegistrationOptions or None
         How the fields are registered; None where they are in the test's coordinates.
     rounds : int
@@ -488,6 +489,7 @@ def clamp_radius(
     InputError
         Too few points around the disk stand still.
     """
+    fields = sorted(fields, key=lambda field: field.pressure)
     points, displacement = correlated_points(fields[-1].frame)
     weight = np.linalg.norm(displacement, axis=1)
     from_centre = points - weight @ points / weight.sum()

@@ -327,8 +327,8 @@ class FieldReading:
         return tuple(points for _, _, points in self.frames)
 
     @property
-    def columns(self) -> Mapping[str, Array]:
-        """Return time, axis and x, y, z (mm) of every value, by name."""
+    def columns(self) -> Mapping[str, NDArray[Any]]:
+        """Return time, axis ("x", "y" or "z") and x, y, z (mm) of every value (n,), by name."""
         places = zip("xyz", np.concatenate(self.blocks).T, strict=True)
         counts = [len(points) for points in self.blocks]
         times, axes, _ = zip(*self.frames, strict=True)

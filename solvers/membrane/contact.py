@@ -110,7 +110,7 @@ def brought_to_touch(
     position : (n, 3) array, mm
         Of the surface's nodes.
     direction : (3,) array
-        Unit vector.
+        Unit vector, normal to the axis of the body.
     bite : float, mm
         Depth by which the deepest node shall penetrate the body.
 
@@ -127,14 +127,14 @@ def brought_to_touch(
     axis = np.asarray(body.axis, dtype=float)
     arm = position - centre
     if body.ring:
-        within_reach = np.abs(arm @ axis) < 0.5 * body.length
+        is_within_reach = np.abs(arm @ axis) < 0.5 * body.length
     else:
-        within_reach = np.abs(arm @ np.cross(axis, direction)) < body.radius
-    if not within_reach.any():
+        is_within_reach = np.abs(arm @ np.cross(axis, direction)) < body.radius
+    if not is_within_reach.any():
         problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
         raise InputError(None, "mesh", problem)
-    nodes = position[within_reach]
-    heights = arm[within_reach] @ direction
+    nodes = position[is_within_reach]
+    heights = arm[is_within_reach] @ direction
     low = float(heights.min()) - 2 * body.radius
     high = float(heights.max()) + 2 * body.radius
     # Search the first touch from outside; a ring starts around the membrane's middle.

@@ -220,6 +220,10 @@ def test_radius_of_the_clamp_needs_no_first_guess(clean_bubble, off):
     assert radius == pytest.approx(100.0, rel=3e-3) and edge.still_count > 200
     seen = in_camera(TURN("x", 12.0), (30.0, 20.0, 500.0))(fields)
     assert clamp_radius(seen, RegistrationOptions())[0] == pytest.approx(radius, rel=1e-4)
+    # A release ends at a low pressure, where nothing but the noise moves.
+    low = replace(fields[0], pressure=1e-4, displacement=0.01 * fields[0].displacement)
+    released = in_camera(TURN("x", 12.0), (30.0, 20.0, 500.0))((*fields, *noisy([low], 0.02)))
+    assert clamp_radius(released, RegistrationOptions())[0] == pytest.approx(radius, rel=1e-3)
     # Points of the clamp just beyond the rim, on one side, do not draw its centre there.
     near = np.hypot(*fields[0].points.T) > 100.0
     kept = ~near | (fields[0].points[:, 1] < 0.0) | (np.hypot(*fields[0].points.T) > 102.0)

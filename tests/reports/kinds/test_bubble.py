@@ -72,6 +72,26 @@ def test_card_on_a_bubble_gives_numbers_lines_and_table(tmp_path, monkeypatch):
     assert (tmp_path / "bubble.pvd").exists()
 
 
+@pytest.mark.parametrize(
+    ("settings", "note"),
+    [
+        ({}, None),
+        ({"tension": (0.5, 0.0)}, None),
+        ({"modes": 3}, "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"),
+        (
+            {"modes": 3, "tension": (0.5, 0.0)},
+            "a flat sheet with a fixed rim; of [bubble.sheet] only tension is used",
+        ),
+    ],
+)
+def test_simulation_tells_what_it_uses_of_the_sheet(tmp_path, monkeypatch, settings, note):
+    caught(monkeypatch, report, "bubbles.cut_charts")
+    lines = simulated(tmp_path, SheetSettings(**settings), soft=history()).lines
+    assert [line for line in lines if "note" in line] == (
+        [f"note: simulated from {note}"] if note else []
+    )
+
+
 def test_residual_is_measured_minus_modelled():
     moved = np.stack([stretched(1.01, 1.0), stretched(1.02, 1.0)])
     read = moved[1] + [0.3, -0.2, 0.1]
