@@ -489,8 +489,8 @@ def clamp_radius(
     InputError
         Too few points around the disk stand still.
     """
-    fields = sorted(fields, key=lambda field: field.pressure)
-    points, displacement = correlated_points(fields[-1].frame)
+    rising = sorted(fields, key=lambda field: field.pressure)
+    points, displacement = correlated_points(rising[-1].frame)
     weight = np.linalg.norm(displacement, axis=1)
     from_centre = points - weight @ points / weight.sum()
     # First guess: for a paraboloid on a disk of radius R the mean square distance from the centre,
@@ -498,9 +498,9 @@ def clamp_radius(
     weighted_square = (weight @ from_centre**2).sum()
     radius = float(np.sqrt(3.0 * weighted_square / weight.sum()))
     for _ in range(rounds):
-        registered = fields
+        registered: Sequence[DisplacementField] = rising
         if options is not None:
-            registered, _ = register_fields(fields, Outline.circle(radius), options)
+            registered, _ = register_fields(rising, Outline.circle(radius), options)
         surfaces = [(field.points, field.displacement[:, 2]) for field in registered]
         edge = clamp_of_motion(_high_surfaces(surfaces), (radius, radius))
         if edge is None:
