@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from .builders.bars import BarSolver, known_bars
 from .builders.projects import constant_strips, known_bubble
-from .slow import mark_slow
+from .slow import longest_first, mark_slow
 from .support import needs, rounding, shared_work
 from .support.charts import check_charts
 from .support.golden import Golden
@@ -65,6 +65,8 @@ def pytest_collection():
 
 def pytest_collection_modifyitems(config, items):
     mark_slow(items)
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        longest_first(items)
     if config.getoption("--only-golden"):
         items[:] = [item for item in items if "golden" in getattr(item, "fixturenames", ())]
 

@@ -20,10 +20,10 @@ MAX_SETUP = 3.0
 LINE = re.compile(r"^([\d.]+)s (call|setup|teardown) +(\S+?)(?:\[.*)?$")
 
 
-def listed() -> set[str]:
+def listed() -> list[str]:
     """Return the slow test functions and fixtures, as "tests/runs/test_fit.py::test_name"."""
     lines = LIST.read_text(encoding="utf-8").splitlines()
-    return {line for line in lines if line and not line.startswith("#")}
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 def fixtures_of(item: pytest.Item) -> set[str]:
@@ -39,10 +39,22 @@ def fixtures_of(item: pytest.Item) -> set[str]:
 
 def mark_slow(items: list[pytest.Item]) -> None:
     """Mark the tests that the list names, or a fixture of theirs."""
-    names = listed()
+    names = set(listed())
     for item in items:
         if item.nodeid.split("[")[0] in names or fixtures_of(item) & names:
             item.add_marker(pytest.mark.slow)
+
+
+def longest_first(items: list[pytest.Item]) -> None:
+    """Sort the marked tests to the front, by file as listed: no worker is left with a long one."""
+    files = list(dict.fromkeys(name.split("::")[0] for name in listed()))
+    rank = {file: number for number, file in enumerate(files)}
+
+    def place(item: pytest.Item) -> int:
+        is_slow = item.get_closest_marker("slow") is not None
+        return rank.get(item.nodeid.split("::")[0], 0) if is_slow else len(files)
+
+    items.sort(key=place)
 
 
 class Collected:
@@ -55,7 +67,7 @@ class Collected:
 
 
 def slow_names(log: str, items: list[pytest.Item]) -> list[str]:
-    """Return the slow test functions and fixtures of a log of durations."""
+    """Return the slow test functions and fixtures of a log of durations, the longest file first."""
     calls: dict[str, float] = defaultdict(float)
     waits: dict[str, float] = defaultdict(float)
     for line in log.splitlines():
@@ -72,7 +84,10 @@ def slow_names(log: str, items: list[pytest.Item]) -> list[str]:
             folder = name.split("::")[0]
             near = {f for f in fixtures.get(name, ()) if f.startswith(folder)}
             slow |= near or {name}
-    return sorted(slow)
+    of_file: dict[str, float] = defaultdict(float)
+    for name, seconds in [*calls.items(), *waits.items()]:
+        of_file[name.split("::")[0]] += seconds
+    return sorted(slow, key=lambda name: (-of_file[name.split("::")[0]], name))
 
 
 def main(log: str) -> None:

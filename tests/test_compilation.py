@@ -28,7 +28,10 @@ def run(cache, package=None):
 
 
 def _compiles(file):
-    functions = (n for n in ast.walk(ast.parse(file.read_text())) if isinstance(n, ast.FunctionDef))
+    text = file.read_text()
+    if "compiled" not in text:
+        return False
+    functions = (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.FunctionDef))
     decorators = (d for function in functions for d in function.decorator_list)
     return any("compiled" in ast.unparse(decorator) for decorator in decorators)
 

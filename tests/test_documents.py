@@ -9,7 +9,6 @@ import runpy
 import subprocess
 import sys
 import time
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import unquote, urlsplit
@@ -25,7 +24,7 @@ from bubblefit.solvers.registry import solver_sections
 from .support.browser import browser
 from .support.commands import in_process, one_line
 from .support.golden import is_alike_line, normalised
-from .support.paths import PUBLISHED, ROOT, load_script
+from .support.paths import PUBLISHED, ROOT, load_script, syntax_tree
 from .support.refusals import complaint
 
 
@@ -109,13 +108,8 @@ def verified():
     return [(f"{what}, {against}", within, by) for what, against, within, by in rows[1:]]
 
 
-@cache
-def parsed(path):
-    return ast.parse(path.read_text())
-
-
 def definition(path, name):
-    for node in parsed(path).body:
+    for node in syntax_tree(path).body:
         if isinstance(node, ast.FunctionDef) and node.name == name:
             return node, path
         if isinstance(node, ast.Assign) and name in [ast.unparse(t) for t in node.targets]:
@@ -187,7 +181,7 @@ def messages():
     for path in sorted(ROOT.rglob("*.py")):
         if path.relative_to(ROOT).parts[0] in OUTSIDE:
             continue
-        nodes, apart = list(ast.walk(parsed(path))), set()
+        nodes, apart = list(ast.walk(syntax_tree(path))), set()
         for node in nodes:  # docstrings, and formats of what is computed, such as ".0%"
             if isinstance(node, ast.Expr):
                 apart.add(id(node.value))

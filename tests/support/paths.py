@@ -18,6 +18,12 @@ NOT_THE_PRODUCT = {"tests", "benchmarks", "docs", "examples", "out", "build", "d
 
 
 @cache
+def syntax_tree(path):
+    """Return the syntax tree of a module, which is parsed once in a run."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def product_modules():
     """Return the syntax tree of each module of the product by its path below the root."""
     paths = (path.relative_to(ROOT) for path in sorted(ROOT.rglob("*.py")))
@@ -28,7 +34,7 @@ def product_modules():
         and path.parts != ("setup.py",)
         and not path.parts[0].startswith(".")
     ]
-    return {path: ast.parse((ROOT / path).read_text(encoding="utf-8")) for path in modules}
+    return {path: syntax_tree(ROOT / path) for path in modules}
 
 
 def load_script(place):
