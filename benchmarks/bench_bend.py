@@ -7,7 +7,7 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.cylinder.curve import initial_stiffness
+from bubblefit.experiments.cylinder.measures import initial_stiffness
 from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.cylinder_model import inflated_cylinder

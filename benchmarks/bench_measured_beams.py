@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.cylinder.curve import against_measured
+from bubblefit.experiments.cylinder.measures import against_measured
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeCrossSection
 from bubblefit.meshes.cylinder_model import Cord, ForceTable, curve_reading

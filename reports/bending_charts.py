@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..experiments.cylinder.curve import CurvePoint
+from ..experiments.cylinder.measures import CurvePoint
 from ..readers.bending import BendingCurve, BendingScatter
 from ..solvers.base import Array
 from .charts import Chart, Charts, Series, band, dots, faces, line, shades_of

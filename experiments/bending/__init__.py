@@ -11,9 +11,8 @@ from ...inference.objective import NoiseIs
 from ...readers.sections import Positive, Weight
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting
-from ..cylinder.reading import read as read_cylinder
-from ..cylinder.section import BentSection
-from ..cylinder.test import PART, CylinderTest
+from ..cylinder.test import PART, BentSection, CylinderTest
+from ..cylinder.test import read as read_cylinder
 from ..measured import MeasuredKind, PreparedWhole
 from ..sections import Place
 from ..strips.load_objective import LoadObjective

@@ -2,8 +2,7 @@
 
 from ..base import BaseKind
 from .predicted import STUDIED, CylinderPredicted
-from .reading import read
-from .section import CylinderSection
+from .test import CylinderSection, read
 
 
 class CylinderKind(BaseKind):

@@ -1,4 +1,4 @@
-"""Results of predicted bending of cylinders with material cards: numbers, tables and bands."""
+"""Predicted bending of cylinders with material cards: numbers, tables, bands and lines of a run."""
 
 from __future__ import annotations
 
@@ -12,21 +12,28 @@ import numpy as np
 from ...lazy_modules import pandas as pd
 from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
+from ...notes import marks_of
 from ...readers.bending import BendingError, scatter
 from ...solvers.base import Array, BandEnd, History
 from ..forward import STRAINS, Studied
 from ..predicted import PredictedRun, band_of
-from .curve import (
+from .measures import (
+    BendingMeasures,
+    BendingRun,
     CurvePoint,
     MeasuredComparison,
+    Model,
+    angle_sensitivity,
+    arrays_of,
+    bending_measures,
+    deflections_of,
     initial_stiffness,
+    is_near_neutral,
     knee_point,
     limit_point,
     loads_at,
+    run_of,
 )
-from .measures import BendingMeasures, angle_sensitivity, bending_measures, is_near_neutral
-from .run import BendingRun, Model, arrays_of, deflections_of, run_of
-from .terminal import describe_runs
 from .test import CylinderTest
 
 #: Columns of a curve.
@@ -316,15 +323,7 @@ class CylinderOutcome:
 
     def lines(self) -> Sequence[str]:
         """Return a table for the terminal, and notes on cards of unknown spread."""
-        table = describe_runs(
-            runs=self.runs,
-            places=place_names(run.test for run in self.runs),
-            measures=self.measures,
-            sigmas={i: self.sigma(i) for i in self.measures},
-            ends=[self.ended(i) for i in range(len(self.runs))],
-            has_spreads=bool(self.spreads),
-        )
-        return [*table, *self.unsure]
+        return [*_terminal_table(self), *self.unsure]
 
 
 def _column_values(m: BendingMeasures) -> list[float | None]:
@@ -446,3 +445,66 @@ STUDIED = Studied(
     response="load",
     curve=deflection_curve,
 )
+
+
+def describe_load(load: float | None, sigma: float | None, unit: str = "") -> str:
+    """Return a load (N) in words, with one standard deviation (N) where it is known."""
+    if load is None:
+        return "-"
+    return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
+
+
+def _terminal_table(outcome: CylinderOutcome) -> list[str]:
+    """Return the lines of a table: stiffness, knee, limit point, loads and error of each run."""
+    measures = outcome.measures
+    places = place_names(run.test for run in outcome.runs)
+    header, *names = _padded_names(outcome.runs)
+    points = {i: (m.describe(m.knee), m.describe(m.limit)) for i, m in measures.items()}
+    point_columns = list(zip(("knee", "limit point"), *points.values(), strict=False))
+    point_widths = [max(map(len, column)) + 2 for column in point_columns]
+    load_widths = [max(len(place), 13 if outcome.spreads else 7) + 2 for place in places]
+    has_errors = any(m.error is not None for m in measures.values())
+
+    header += "   N/mm" + _right_aligned((column[0] for column in point_columns), point_widths)
+    header += _right_aligned(places, load_widths) + ("   error" if has_errors else "")
+    lines = [header]
+    for i, run in enumerate(outcome.runs):
+        end = outcome.ended(i)
+        if i not in measures:
+            lines.append(f"{names[i]}  {end}")
+            continue
+        m = measures[i]
+        sigmas = outcome.sigma(i)
+        loads = [describe_load(m.loads.get(p), sigmas.get(p), " N") for p in places]
+        stiffness = "-" if m.stiffness is None else f"{m.stiffness:.2f}"
+        line = f"{names[i]} {stiffness:>6}"
+        line += _right_aligned(points[i], point_widths) + _right_aligned(loads, load_widths)
+        if has_errors:
+            error = "-" if m.error is None else f"{100 * m.error.relative:.1f} %"
+            line += f"{error:>8}"
+        lines.append("  ".join([line, *_remarks(run, end)]))
+    return lines
+
+
+def _remarks(run: PredictedRun, end: str) -> list[str]:
+    """Return how a run ended, where that was early, and the kinds of its marked notes."""
+    remarks = [end] if run.record.early else []
+    marked = marks_of(run.notes)
+    return [*remarks, f"[{', '.join(marked)}]"] if marked else remarks
+
+
+def _padded_names(runs: Sequence[PredictedRun]) -> list[str]:
+    """Return the header, then test, card and wall of each run, in columns."""
+    count = 3 if any(run.wall for run in runs) else 2
+    rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
+    rows_shown = [row[:count] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*rows_shown, strict=True)]
+    return [
+        "  ".join(f"{name:<{width}}" for name, width in zip(row, widths, strict=True))
+        for row in rows_shown
+    ]
+
+
+def _right_aligned(cells: Iterable[str], widths: Sequence[int]) -> str:
+    """Return cells as one line, each at the right end of its column."""
+    return "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

@@ -4,10 +4,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from bubblefit.experiments.cylinder.curve import CurvePoint
-from bubblefit.experiments.cylinder.measures import BendingMeasures
+from bubblefit.experiments.cylinder.measures import BendingMeasures, BendingRun, CurvePoint
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
-from bubblefit.experiments.cylinder.run import BendingRun
 from bubblefit.notes import SOLVER, Note
 from bubblefit.readers.bending import BendingCurve, BendingError
 from bubblefit.solvers.base import EARLY, SNAP

@@ -10,7 +10,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.experiments.cylinder.run import run_of
+from bubblefit.experiments.cylinder.measures import run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.notes import Note
 from bubblefit.project.schema import usual_folder

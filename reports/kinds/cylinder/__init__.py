@@ -9,15 +9,14 @@ from typing import Literal
 import numpy as np
 
 from ....experiments.cylinder import CylinderKind
-from ....experiments.cylinder.curve import CRITERIA, CURVE_PROPERTIES
-from ....experiments.cylinder.measures import BendingMeasures
+from ....experiments.cylinder.measures import CRITERIA, CURVE_PROPERTIES, BendingMeasures
 from ....experiments.cylinder.predicted import (
     CylinderOutcome,
     CylinderPredicted,
+    describe_load,
     measured_table,
     place_names,
 )
-from ....experiments.cylinder.terminal import describe_load
 from ....experiments.cylinder.test import PART, CylinderTest
 from ....experiments.data_files import CaptionedFile, Output
 from ....experiments.forward import Cards, Runs, Simulation

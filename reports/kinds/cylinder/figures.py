@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....experiments.cylinder.measures import BendingRun, Model
 from ....experiments.cylinder.predicted import CylinderOutcome
-from ....experiments.cylinder.run import BendingRun, Model
 from ....experiments.cylinder.test import CylinderTest
 from ....experiments.data_files import CaptionedFile, Output
 from ....materials.card import BAND, LEVEL

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.cylinder.curve import CurvePoint
+from bubblefit.experiments.cylinder.measures import CurvePoint
 from bubblefit.experiments.data_files import Output
 from bubblefit.reports.kinds import cylinder
 from bubblefit.reports.kinds.cylinder import assumptions, figures, how_sure

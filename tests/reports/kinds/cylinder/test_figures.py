@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.run import BendingRun, run_of
+from bubblefit.experiments.cylinder.measures import BendingRun, run_of
 from bubblefit.experiments.data_files import Output
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
