@@ -1,6 +1,7 @@
 """The measured fields of a bubble with the quantities derived from them that checks judge.
 
-Checks find doubts about the data before a fit; nothing here needs a model.
+Checks find doubts about the data before a fit; nothing here needs a model. Gross outliers, points
+far off all others, are left out of a fit, too.
 """
 
 from collections.abc import Sequence
@@ -17,8 +18,17 @@ from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import UNKNOWN, Expected
 from .field_shape import Apex, Axes, apex_of, symmetry_axes
-from .placement import Rim, RiseSurface, clamp_of_motion, in_all_quarters, rim_of_motion
+from .placement import (
+    SIGMA_PER_MAD,
+    Rim,
+    RiseSurface,
+    clamp_of_motion,
+    in_all_quarters,
+    rim_of_motion,
+    thinned,
+)
 from .registration import are_usable
+from .sheet import fit_disk_polynomial
 
 #: Fewest points on the disk to which a motion, or the sheet's bumps, are fitted: four terms.
 MIN_POINTS = 12
@@ -80,6 +90,48 @@ def _centre_motion(field: DisplacementField, outline: Outline) -> CentreMotion |
     spread = inverse[1:3, 1:3].trace() / 2
     error = float(np.sqrt(variance * spread)) / size
     return CentreMotion(solution[0], np.asarray(solution[1:3].T / size), error)
+
+
+@dataclass(frozen=True)
+class OutlierSearch:
+    """Settings of the search for gross outliers about a smooth surface."""
+
+    deviations: float = 10.0  # distance from the surface in robust standard deviations, and ...
+    rise_share: float = 0.02  # ... as a share of the highest rise: an outlier exceeds both
+    degree: int = 8  # degree of the polynomial surface
+    rounds: int = 5  # largest number of times that outliers are left out and the fit is repeated
+    disk_share: float = 0.95  # points within this share of the radius are judged
+    max_points: int = 4000  # about the largest number of points judged in a frame, evenly thinned
+
+
+OUTLIERS = OutlierSearch()
+
+
+@dataclass(frozen=True)
+class GrossOutliers:
+    """The gross outliers of a field: points far off the smooth surface through the others.
+
+    Attributes
+    ----------
+    field : DisplacementField
+    count : int
+        Number of outliers.
+    point_count : int
+        Number of points that were judged.
+    farthest : float, mm
+        Largest distance of an outlier from the surface, in any component of the displacement.
+    scatter : float, mm
+        Robust standard deviation of the other points about the surface, in dz.
+    is_outlying : (n,) bool array
+        Which of all points of the field are outliers.
+    """
+
+    field: DisplacementField
+    count: int
+    point_count: int
+    farthest: float
+    scatter: float
+    is_outlying: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,3 +296,59 @@ class MeasuredView:
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
         """Return which points (n,) of a field lie within a share of the rim's radius."""
         return self.outline.share(field.points) < share
+
+    def gross_outliers(self, field: DisplacementField) -> GrossOutliers:
+        """Return the gross outliers of a field; none where it has too few points for a surface."""
+        inner_rows = np.flatnonzero(self.inner(field, OUTLIERS.disk_share))
+        is_outlying = np.zeros(len(field.points), dtype=bool)
+        rows = thinned(inner_rows, OUTLIERS.max_points)
+        points = field.points[rows]
+        displacement = field.displacement[rows]
+        is_kept = np.ones(len(points), dtype=bool)
+        distance = np.zeros_like(displacement)
+        deviation = np.zeros(3)
+        radius = self.outline.major
+        for _ in range(OUTLIERS.rounds):
+            try:
+                surface = fit_disk_polynomial(
+                    points[is_kept], displacement[is_kept], radius, OUTLIERS.degree
+                )
+            except InputError:
+                return GrossOutliers(field, 0, len(points), 0.0, 0.0, is_outlying)
+            distance = np.abs(displacement - surface.values_at(points))
+            deviation = SIGMA_PER_MAD * np.median(distance[is_kept], axis=0)
+            largest = np.maximum(
+                OUTLIERS.deviations * deviation, OUTLIERS.rise_share * self.rises.max()
+            )
+            is_close = (distance <= largest).all(axis=1)
+            if (is_close == is_kept).all():
+                break
+            is_kept = is_close
+        of_all = np.abs(
+            field.displacement[inner_rows] - surface.values_at(field.points[inner_rows])
+        )
+        is_outlying[inner_rows] = (of_all > largest).any(axis=1)
+        farthest = float(distance[~is_kept].max(initial=0.0))
+        count = int((~is_kept).sum())
+        return GrossOutliers(
+            field,
+            count=count,
+            point_count=len(points),
+            farthest=farthest,
+            scatter=float(deviation[2]),  # in dz
+            is_outlying=is_outlying,
+        )
+
+    def outlying_points(
+        self, field: DisplacementField, *, max_share: float = 0.1
+    ) -> NDArray[np.bool_]:
+        """Return which points of a field (n,) lie far off the smooth surface through the others.
+
+        Parameters
+        ----------
+        field : DisplacementField
+        max_share : float
+            Largest share of the points: of more it is not known which are wrong, and none is named.
+        """
+        is_outlying = self.gross_outliers(field).is_outlying
+        return is_outlying & (is_outlying.mean() <= max_share)

@@ -29,7 +29,7 @@ from ..cap import CapEstimate, cap_estimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from . import PART, BubbleTest, KnownSolution, measured_fields
-from .doubts import doubts_of, outlying_points
+from .doubts import doubts_of
 from .field_shape import folded, mirrored
 from .frame_doubts import loaded_alternative
 from .measured_view import MeasuredView
@@ -367,7 +367,7 @@ class PreparedBubble(PreparedInflation):
         if self.known is not None:
             return [np.zeros(len(field.points), dtype=bool) for field in self.fields]
         view = self.view
-        return [outlying_points(view, field) for field in self.fields]
+        return [view.outlying_points(field) for field in self.fields]
 
     @property
     def fields_to_match(self) -> Sequence[DisplacementField]:
