@@ -21,7 +21,7 @@ from ...meshes.disk import disk_mesh
 from ...meshes.mesh import surface_strain
 from ...solvers.base import Solver
 from ...solvers.membrane.solver import MembraneSolver
-from .number import PUBLISHED, Number
+from . import PUBLISHED, Number
 
 #: Number of terms of the series.
 TERMS = 60

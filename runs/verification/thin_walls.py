@@ -12,7 +12,7 @@ from ...meshes.cylinder_model import InflatedModel
 from ...meshes.mesh import Mesh
 from ...solvers.base import History
 from ...solvers.membrane.solver import MembraneSolver
-from .number import Number
+from . import Number
 
 #: Modulus of the walls (MPa), their Poisson's ratio, thickness and radius (mm).
 MODULUS = 300.0

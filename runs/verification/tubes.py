@@ -21,7 +21,7 @@ from ...meshes.strip_models import TubeModel
 from ...solvers.membrane.closed import closed_membrane
 from ...solvers.membrane.solver import MembraneSolver
 from ...solvers.membrane.wall import Wall
-from .number import Number
+from . import Number
 
 #: Radius, length and thickness of the tube (mm), its modulus and its pressure (MPa).
 RADIUS = 100.0

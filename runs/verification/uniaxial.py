@@ -15,8 +15,8 @@ from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.calculix.solver import CalculixSolver, diagnose
 from ...solvers.membrane.solver import MembraneSolver
+from . import Number
 from .bubbles import ABAQUS_SOURCE, bubble_shapes, published_apex, published_cases, table_4_2_law
-from .number import Number
 
 
 def marc_bars(stresses: Sequence[float] | None = None, program: str = "") -> Iterator[Number]:
