@@ -186,8 +186,7 @@ def verify(
         check_one_of(subject, SUBJECTS, "--subject")
     comparisons: dict[str, Callable[[], Iterable[Number]]] = {n: SUBJECTS[n] for n in chosen}
     if data is not None:
-        from .uniaxial import measured_strips
-
+        measured_strips = LazyFunction(f"{__name__}.uniaxial", "measured_strips")
         comparisons["measured strips"] = functools.partial(measured_strips, Path(data))
     on_event = listener(progress)
     numbers = dict[str, Sequence[Number]]()
