@@ -12,8 +12,7 @@ from ...notes import Note, NoteKind
 from ..base import EARLY, SNAP, History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
-from .increments import straight_on
-from .loading import Loading, NoEquilibrium, RunRequest, march
+from .loading import Loading, NoEquilibrium, RunRequest, march, straight_on
 from .neighbours import Neighbours
 from .relaxation import settled
 

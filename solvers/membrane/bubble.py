@@ -19,10 +19,18 @@ from ..base import History
 from ..pretension import stretched
 from .cords import cords_on_sheet
 from .factorisation import SingularTangent, tangent_for
-from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import Loading, NoEquilibrium, RunRequest, march
+from .loading import (
+    IncrementRecord,
+    Loading,
+    NoEquilibrium,
+    RunRequest,
+    lagrange,
+    load_labels,
+    march,
+    monotonic_count,
+)
 from .membrane import Array, Membrane, arrays_of
 from .sensitivity import Derivatives
 from .wall import TENSION_FIELD, Wall

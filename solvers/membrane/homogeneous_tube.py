@@ -9,10 +9,9 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Array
 from ...meshes.strip_models import TubeModel
 from ..base import History
-from .increments import IncrementRecord
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import RunRequest
+from .loading import IncrementRecord, RunRequest
 from .membrane import Membrane, arrays_of
 from .sensitivity import Derivatives
 from .wall import Wall

@@ -15,9 +15,8 @@ from ...notes import Note
 from ..base import SNAP, History
 from . import bending
 from .closed import ClosedMembrane, closed_membrane
-from .increments import IncrementRecord, straight_on
 from .initial_stiffness import initial_moduli
-from .loading import Loading, RunRequest, march, reach_in_halves
+from .loading import IncrementRecord, Loading, RunRequest, march, reach_in_halves, straight_on
 from .neighbours import Neighbours
 from .relaxation import settled
 

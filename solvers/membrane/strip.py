@@ -19,10 +19,17 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
 from .factorisation import AroundTangent, SingularTangent, tangent_for
-from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import Loading, RunRequest, equilibrium_at
+from .loading import (
+    IncrementRecord,
+    Loading,
+    RunRequest,
+    equilibrium_at,
+    lagrange,
+    load_labels,
+    monotonic_count,
+)
 from .membrane import Array, Membrane, arrays_of
 from .sensitivity import Derivatives
 from .wall import Wall

@@ -14,7 +14,7 @@ from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.sampling import sampling_matrix
 from bubblefit.solvers.base import instability
 from bubblefit.solvers.membrane.bubble import inflate_to_heights
-from bubblefit.solvers.membrane.increments import load_labels
+from bubblefit.solvers.membrane.loading import load_labels
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.laws import TABLE_4_2

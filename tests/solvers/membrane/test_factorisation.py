@@ -16,7 +16,7 @@ from bubblefit.solvers.membrane.factorisation import (
     near_step,
     tangent_for,
 )
-from bubblefit.solvers.membrane.increments import load_labels
+from bubblefit.solvers.membrane.loading import load_labels
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...inference.cases import MODEL as CASE_MODEL

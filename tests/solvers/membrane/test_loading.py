@@ -7,6 +7,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane import loading
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 PRESSURES = (0.022, 0.097, 0.186)
@@ -87,3 +88,13 @@ def test_initial_surface_is_a_metric_of_a_flat_sheet():
         axis=(1, 2)
     )
     assert (off < 0.02 * np.abs(taut - there).max(axis=(1, 2))).all()
+
+
+def test_extrapolation_is_exact_for_polynomials():
+    x = np.array([0.0, 1.0, 2.5, 4.0])
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 0.3])
+    known = cubic(x)[:, None, None] * np.ones((4, 2, 3))
+    np.testing.assert_allclose(loading.lagrange(x, known, 5.0), cubic(5.0), rtol=1e-12)
+    path = [np.full((1, 3), 2.0), np.full((1, 3), 3.0)]
+    np.testing.assert_allclose(loading.straight_on([1.0, 3.0], path, 4.0), 3.5)
+    assert loading.straight_on([1.0], path[:1], 4.0) is path[0]
