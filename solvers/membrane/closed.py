@@ -17,7 +17,7 @@ from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import Array
 from .contact import contact_forces
 from .cords import cords_on
-from .factorisation import BorderedTangent, Tangent, tangent_for
+from .factorisation import BorderedTangent, Tangent, by_near_inverse, tangent_for
 from .flexure import Flexure, flexure_of
 from .initial_stiffness import initial_stiffness, refuse_memory
 from .kernel import reference_elements
@@ -146,7 +146,15 @@ class ClosedMembrane(Membrane):
         At the last evaluation; the volume is that inside the meshed part.
     contact : list of (n, 3) ndarray, N
         Forces of each body on the nodes at the last evaluation.
+    touched : list of ((t, 3, 3) ndarray, (t,) ndarray)
+        Stiffness of the contact with each body, N/mm, and the nodes in contact, at the last
+        evaluation with a tangent.
     """
+
+    #: Largest number of corrections of a step for contact that it makes or ends.
+    max_contact_corrections: ClassVar[int] = 4
+    #: Residual of a step that needs no such correction, as a share of that before the step.
+    contact_tolerance: ClassVar[float] = 0.05
 
     #: Factor by which the artificial stress of the slack state is reduced in every iteration.
     slack_fade: ClassVar[float] = 0.6
@@ -170,6 +178,7 @@ class ClosedMembrane(Membrane):
     pressure: float = 0.0
     volume: float = 0.0
     contact: list[Array] = field(default_factory=list)
+    touched: list[tuple[Array, NDArray[np.intp]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -260,15 +269,73 @@ class ClosedMembrane(Membrane):
 
     def _add_contact(self, u: Array, with_tangent: bool) -> None:
         """Add the forces of rigid bodies on the nodes, at the displacement u (nodes, 3) mm."""
-        self.contact = []
+        self.contact, touched = self._contact_at(u)
+        for push in self.contact:
+            self.residual -= push.reshape(-1)
+        if with_tangent:
+            self.touched = touched
+            for stiffness, nodes in touched:
+                self.add(self.node_slot[nodes], stiffness)
+
+    def _contact_at(self, u: Array) -> tuple[list[Array], list[tuple[Array, NDArray[np.intp]]]]:
+        """Return `contact` and `touched` at the displacement u (nodes, 3) mm."""
+        forces = []
+        touched = []
         for body in self.bodies:
-            push, stiffness, touched = contact_forces(
+            push, stiffness, nodes = contact_forces(
                 body, self.reference + u, self.penalty * self.node_area
             )
-            self.residual -= push.reshape(-1)
-            self.contact.append(push)
-            if with_tangent:
-                self.add(self.node_slot[touched], stiffness)
+            forces.append(push)
+            touched.append((stiffness, nodes))
+        return forces, touched
+
+    def step_into_contact(self, u: Array, step: Array) -> Array | None:
+        """Return a Newton step, corrected for contact that it makes or ends, if it does.
+
+        The residual is linearised but for the contact forces, which are those after the step.
+
+        Parameters
+        ----------
+        u : (n, 3) array, mm
+            Displacement at the last evaluation, whose tangent is overwritten.
+        step : (free,) array, mm
+
+        Returns
+        -------
+        (free,) array, mm, or None
+            None if the step needs no correction, or none is found.
+        """
+        free = self.free
+        before = self.residual[free]
+        limit = self.contact_tolerance * float(np.linalg.norm(before))
+        without_contact = before + np.sum(self.contact, axis=0).reshape(-1)[free]
+        corrections = 0
+        while True:
+            motion = np.zeros_like(u)
+            motion.reshape(-1)[free] = step
+            forces, touched = self._contact_at(u + motion)
+            after = self.tangent.times(step[:, None])[:, 0] + without_contact
+            after -= (np.sum(forces, axis=0) + self._contact_product(motion)).reshape(-1)[free]
+            if float(np.linalg.norm(after)) <= limit:
+                return step if corrections else None
+            if corrections == self.max_contact_corrections:
+                return None
+            for sign, contact in ((-1.0, self.touched), (1.0, touched)):
+                for stiffness, nodes in contact:
+                    self.add(self.node_slot[nodes], sign * stiffness)
+            self.touched = touched
+            correction = by_near_inverse(self.tangent, after, tolerance=0.05)
+            if correction is None:
+                return None
+            step = step - correction
+            corrections += 1
+
+    def _contact_product(self, motion: Array) -> Array:
+        """Return the stiffness of `touched` times a motion (n, 3) mm of the nodes, (n, 3) N."""
+        product = np.zeros_like(motion)
+        for stiffness, nodes in self.touched:
+            product[nodes] += np.einsum("tij,tj->ti", stiffness, motion[nodes])
+        return product
 
     def node_weight(self, weight: float) -> Array:
         """Return the weight (n,) N that each node carries.

@@ -108,21 +108,18 @@ def near_step(
     SingularTangent
         If the tangent cannot be factorised.
     """
-    x = None if is_changed else _by_near_inverse(tangent, rhs, max_rounds, tolerance)
+    x = None if is_changed else by_near_inverse(tangent, rhs, tolerance, max_rounds)
     if x is None:
         tangent.renew()
-        x = _by_near_inverse(tangent, rhs, max_rounds, tolerance)
+        x = by_near_inverse(tangent, rhs, tolerance, max_rounds)
     if x is None:
         tangent.factor()
         x = tangent.solve(rhs)
     return x
 
 
-def _by_near_inverse(
-    tangent: Tangent,
-    rhs: Array,
-    max_rounds: int,
-    tolerance: float,
+def by_near_inverse(
+    tangent: Tangent, rhs: Array, tolerance: float, max_rounds: int = 8
 ) -> Array | None:
     """Return the solution (free,) with the near inverse, or None if it takes too many iterations.
 
@@ -266,8 +263,10 @@ class StoredTangent(Tangent):
         pointer = np.searchsorted(keys // size, np.arange(size + 1)).astype(np.int32)
         index = (keys % size).astype(np.int32)
         self.data = np.zeros(len(keys))
-        csc_parts = np.zeros(len(keys)), index, pointer
+        csc_parts = np.arange(1.0, len(keys) + 1), index, pointer
         self._matrix = scipy.sparse.csc_matrix(csc_parts, shape=(size, size))
+        #: Number of the entry of `data` across the diagonal from each.
+        self.transposed = self._matrix.T.tocsc().data.astype(np.intp) - 1
         self.near: NearInverse | None = None
 
     @property
@@ -306,8 +305,9 @@ class BandedTangent(StoredTangent):
         self.size = len(rank)
         self.depth = depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.place = j * depth + 2 * width + i - j
-        self.lower = i >= j
-        self.lower_place = np.minimum(i, j) * (width + 1) + np.abs(i - j)
+        self.lower = np.flatnonzero(i >= j)
+        self.upper = self.transposed[self.lower]
+        self.lower_place = (j * width + i)[self.lower]
         self.numbers = np.zeros(depth * self.size)
         self.rank = rank
         self.order = np.argsort(rank)
@@ -346,9 +346,7 @@ class BandedTangent(StoredTangent):
             Type of its numbers.
         """
         half: Any = np.zeros((self.width + 1) * self.size, dtype=number)
-        half[self.lower_place[self.lower]] = 0.5 * self.data[self.lower]
-        half[self.lower_place[~self.lower]] += 0.5 * self.data[~self.lower]
-        half[:: self.width + 1] *= 2.0
+        half[self.lower_place] = 0.5 * (self.data[self.lower] + self.data[self.upper])
         band = half.reshape((self.width + 1, self.size), order="F")
         factorise = scipy.linalg.get_lapack_funcs("pbtrf", dtype=number)
         factor, info = factorise(band, lower=1, overwrite_ab=1)
@@ -415,14 +413,12 @@ class SparseTangent(StoredTangent):
     ) -> None:
         size = int(place.max()) + 1
         super().__init__(rows, columns, is_free, size)
-        numbers = self._matrix.copy()
-        numbers.data = np.arange(1, len(self.data) + 1)
-        self._transposed = numbers.T.tocsc().data - 1
-        column = np.repeat(np.arange(size), np.diff(numbers.indptr))
-        self.fronts = Fronts(dissection, place, numbers.indices, column)
+        column = np.repeat(np.arange(size), np.diff(self._matrix.indptr))
+        self.fronts = Fronts(dissection, place, self._matrix.indices, column)
         self._order = self.fronts.order
-        self._ordered = numbers[self._order][:, self._order].tocsc()
+        self._ordered = self._matrix[self._order][:, self._order].tocsc()
         self._ordered.sort_indices()
+        self._ordered.data = self._ordered.data.astype(np.intp) - 1
 
     def factor(self) -> None:
         lu = self._exact_factors(self.data)
@@ -458,7 +454,7 @@ class SparseTangent(StoredTangent):
 
     def _symmetric_part(self) -> Array:
         """Return the entries (nonzeros,) of the symmetric part of the tangent."""
-        return np.asarray(0.5 * (self.data + self.data[self._transposed]))
+        return np.asarray(0.5 * (self.data + self.data[self.transposed]))
 
     def _exact_factors(self, data: Array) -> Any:
         """Return SuperLU's factors of a matrix, its unknowns reordered.
@@ -468,7 +464,7 @@ class SparseTangent(StoredTangent):
         data : (nonzeros,) array
             Entries of the matrix.
         """
-        parts = data[self._ordered.data - 1], self._ordered.indices, self._ordered.indptr
+        parts = data[self._ordered.data], self._ordered.indices, self._ordered.indptr
         try:
             return scipy.sparse.linalg.splu(
                 scipy.sparse.csc_matrix(parts, shape=self._ordered.shape),

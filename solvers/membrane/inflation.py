@@ -19,6 +19,7 @@ from .initial_stiffness import initial_moduli
 from .loading import IncrementRecord, Loading, RunRequest, march, reach_in_halves, straight_on
 from .neighbours import Neighbours
 from .relaxation import settled
+from .wall import LEFT
 
 Array = NDArray[np.float64]
 
@@ -130,10 +131,16 @@ def analyse_inflated(
     membrane.wrinkle[:] = 0.0
     neighbours = Neighbours(membrane, request.parameters)
     levels = np.array(model.pressures)
-    if model.bending is not None and membrane.wrinkle_stiffness is not None:
+    membranes = [membrane, *neighbours.membranes]
+    if model.bending is not None:
         # Every third is enough, as only the last is reported and the law hardly depends on
-        # increments. With a stiff wall, whose caps fold in large steps, none is left out.
+        # increments. A wall that carries compression first wrinkles, as its caps could fold in
+        # many ways on the way up, and does not from the full pressure on.
         levels = levels[::-3][::-1]
+        if membrane.wall.wrinkle_stiffness is None:
+            levels = np.append(levels, levels[-1])
+        for inflated_membrane in membranes:
+            inflated_membrane.wrinkle_stiffness = membrane.wall.wrinkle_stiffness or LEFT
     volume = np.zeros(len(levels))
     wrinkled = np.zeros(len(levels))
     sides = np.ones(len(model.mesh.quads), dtype=bool)
@@ -148,6 +155,11 @@ def analyse_inflated(
         record.accept(i, u)
         volume[i] = membrane.volume
         wrinkled[i] = membrane.wrinkled_share(sides)
+        if i == len(levels) - 2:
+            for inflated_membrane in membranes:
+                inflated_membrane.wrinkle_stiffness = membrane.wall.wrinkle_stiffness
+                if membrane.wall.wrinkle_stiffness is None:
+                    inflated_membrane.wrinkle[:] = 0.0
     remarks = filling.remarks()
     if model.bending is not None:
         released = _released(membrane, model, record.path[-1], neighbours)
@@ -223,8 +235,10 @@ class Filling(Loading):
     """
 
     max_halvings = 8
-    #: If the volume grows by a larger share in an increment, it is repeated by volume control.
+    #: If the volume grows by a larger share in an increment, it is repeated in smaller steps, and
+    #: by volume control from where they would be less than a share of the increment.
     max_volume_growth = 0.1
+    smallest_step = 0.02
 
     def __init__(self, membrane: ClosedMembrane) -> None:
         self.membrane = membrane
@@ -259,16 +273,55 @@ class Filling(Loading):
         halvings: int,
     ) -> Array | None:
         displacement = self._directly(lower, u, level, start, halvings)
-        if displacement is not None:
-            cavity = self.membrane.cavity
-            reference = self.membrane.reference
-            volume, _ = cavity.measure(reference + displacement)
-            previous_volume, _ = cavity.measure(reference + u)
-            if volume < (1.0 + self.max_volume_growth) * previous_volume:
-                return displacement
-            # Newton may leap over a limit point, but the law needs the strain path across it.
+        if displacement is not None and self._grows_steadily(u, displacement, 1.0):
+            return displacement
+        # Newton may leap over a limit point, but the law needs the strain path across it.
+        lower, u = self._steadily_towards(lower, u, level)
+        if lower == level:
+            return u
         self.snaps.append((lower, level))
         return through_snap(self.membrane, u, lower, level)
+
+    def _grows_steadily(self, u: Array, displacement: Array, share: float) -> bool:
+        """Return whether the volume grows little between two displacements (nodes, 3) mm.
+
+        Parameters
+        ----------
+        share : float
+            Of the increment that lies between them. With the root of it the growth may fall, so
+            that steps which approach a leap end.
+        """
+        cavity = self.membrane.cavity
+        reference = self.membrane.reference
+        volume, _ = cavity.measure(reference + displacement)
+        previous_volume, _ = cavity.measure(reference + u)
+        return volume < (1.0 + self.max_volume_growth * np.sqrt(share)) * previous_volume
+
+    def _steadily_towards(self, lower: float, u: Array, level: float) -> tuple[float, Array]:
+        """Return the highest pressure up to a level to which the volume grows steadily.
+
+        Its displacement (nodes, 3) mm follows. Steps below the level are accepted.
+
+        Parameters
+        ----------
+        lower, u
+            The pressure reached before, and the displacement there.
+        """
+        increment = level - lower
+        step = 0.5 * increment
+        while step >= self.smallest_step * increment:
+            target = min(level, lower + step)
+            displacement = self.equilibrium(u, target)
+            share = (target - lower) / increment
+            if displacement is None or not self._grows_steadily(u, displacement, share):
+                step = 0.5 * step
+                continue
+            lower, u = target, displacement
+            if lower == level:
+                break
+            self.membrane.accept()
+            step = 1.5 * step
+        return lower, u
 
     def failure_message(self, previous: float, level: float, increment: str) -> str:
         return (

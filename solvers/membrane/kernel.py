@@ -157,28 +157,6 @@ class SheetSlopes(NamedTuple):
     area: Array
 
 
-class TangentBlocks(NamedTuple):
-    """Work arrays for the tangent of a Gauss point.
-
-    Attributes
-    ----------
-    k00, k01, k10, k11 : (3, 3) array
-        Blocks of the module's formula.
-    warp_row, fill_row : (3, 12) array
-        Sums a_m K00 + d_m K01 and a_m K10 + d_m K11 for the four nodes m.
-    pressure : (3, 12) array
-        Likewise, minus the derivative of the pressure force.
-    """
-
-    k00: Array
-    k01: Array
-    k10: Array
-    k11: Array
-    warp_row: Array
-    fill_row: Array
-    pressure: Array
-
-
 @compiled(internal=True)
 def node_positions(  # type: ignore[no-untyped-def]
     position,
@@ -324,105 +302,90 @@ def _add_forces(  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _write_blocks(  # type: ignore[no-untyped-def]
-    f,
-    stiff,
-    wt,
-    tension,
-    blocks,
-):
-    """Write the blocks K00, K01, K10, K11 of a Gauss point, see the module.
-
-    Parameters
-    ----------
-    stiff : (3, 3) array, MPa
-        d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in place by the
-        point's volume wt (mm^3).
-    tension : (3,) array, N mm
-        2nd Piola-Kirchhoff stress times volume.
-    """
-    s0, s1, s2 = tension
-    for i in range(3):
-        for j in range(3):
-            stiff[i, j] *= wt
-    for i in range(3):
-        f0 = f[0, i]
-        f1 = f[1, i]
-        # row i of A0^T D and of A1^T D
-        u0 = f0 * stiff[0, 0] + f1 * stiff[2, 0]
-        u1 = f0 * stiff[0, 1] + f1 * stiff[2, 1]
-        u2 = f0 * stiff[0, 2] + f1 * stiff[2, 2]
-        v0 = f1 * stiff[1, 0] + f0 * stiff[2, 0]
-        v1 = f1 * stiff[1, 1] + f0 * stiff[2, 1]
-        v2 = f1 * stiff[1, 2] + f0 * stiff[2, 2]
-        for j in range(3):
-            blocks.k00[i, j] = u0 * f[0, j] + u2 * f[1, j]
-            blocks.k01[i, j] = u1 * f[1, j] + u2 * f[0, j]
-            blocks.k10[i, j] = v0 * f[0, j] + v2 * f[1, j]
-            blocks.k11[i, j] = v1 * f[1, j] + v2 * f[0, j]
-        blocks.k00[i, i] += s0
-        blocks.k01[i, i] += s2
-        blocks.k10[i, i] += s2
-        blocks.k11[i, i] += s1
-
-
-@compiled(internal=True)
 def _write_rows(  # type: ignore[no-untyped-def]
     f,
     slopes,
+    stiffness,
+    volume,
+    tension,
     wp,
-    blocks,
+    rows,
 ):
-    """Write the rows of `blocks`: their factors are the shape functions of the other node, n.
+    """Write the sums of a Gauss point over the blocks K, times derivatives of shape functions.
 
     Parameters
     ----------
+    slopes : (2, 4) array, 1/mm
+        Derivatives of the shape functions.
+    stiffness : (3, 3) array, MPa
+        d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain.
+    volume : float, mm^3
+    tension : (3,) array, N mm
+        2nd Piola-Kirchhoff stress times volume.
     wp : float, N
         Pressure times area, of the follower pressure.
+    rows : (3, 36) array
+        a_m K00 + d_m K01 and a_m K10 + d_m K11 for the four nodes m, and minus the derivative of
+        the pressure force, each (3, 4, 3) by direction, node m and its direction. The last has
+        zeros on its diagonal, which stay.
     """
-    push = blocks.pressure
+    s0, s1, s2 = tension
+    for i in range(3):
+        f0 = volume * f[0, i]
+        f1 = volume * f[1, i]
+        # row i of A0^T D and of A1^T D
+        u0 = f0 * stiffness[0, 0] + f1 * stiffness[2, 0]
+        u1 = f0 * stiffness[0, 1] + f1 * stiffness[2, 1]
+        u2 = f0 * stiffness[0, 2] + f1 * stiffness[2, 2]
+        v0 = f1 * stiffness[1, 0] + f0 * stiffness[2, 0]
+        v1 = f1 * stiffness[1, 1] + f0 * stiffness[2, 1]
+        v2 = f1 * stiffness[1, 2] + f0 * stiffness[2, 2]
+        for j in range(3):
+            k00 = u0 * f[0, j] + u2 * f[1, j]
+            k01 = u1 * f[1, j] + u2 * f[0, j]
+            k10 = v0 * f[0, j] + v2 * f[1, j]
+            k11 = v1 * f[1, j] + v2 * f[0, j]
+            if i == j:
+                k00 += s0
+                k01 += s2
+                k10 += s2
+                k11 += s1
+            for n in range(4):
+                a = slopes[0, n]
+                d = slopes[1, n]
+                rows[0, 12 * i + 3 * n + j] = a * k00 + d * k01
+                rows[1, 12 * i + 3 * n + j] = a * k10 + d * k11
     for n in range(4):
-        a = slopes[0, n]
-        d = slopes[1, n]
-        z0 = wp * (d * f[0, 0] - a * f[1, 0])
-        z1 = wp * (d * f[0, 1] - a * f[1, 1])
-        z2 = wp * (d * f[0, 2] - a * f[1, 2])
-        c0 = 3 * n
-        c1 = 3 * n + 1
-        c2 = 3 * n + 2
-        push[0, c0] = 0.0
-        push[0, c1] = z2
-        push[0, c2] = -z1
-        push[1, c0] = -z2
-        push[1, c1] = 0.0
-        push[1, c2] = z0
-        push[2, c0] = z1
-        push[2, c1] = -z0
-        push[2, c2] = 0.0
-        for i in range(3):
-            for j in range(3):
-                blocks.warp_row[i, 3 * n + j] = a * blocks.k00[i, j] + d * blocks.k01[i, j]
-                blocks.fill_row[i, 3 * n + j] = a * blocks.k10[i, j] + d * blocks.k11[i, j]
+        a = wp * slopes[0, n]
+        d = wp * slopes[1, n]
+        z0 = d * f[0, 0] - a * f[1, 0]
+        z1 = d * f[0, 1] - a * f[1, 1]
+        z2 = d * f[0, 2] - a * f[1, 2]
+        rows[2, 3 * n + 1] = z2
+        rows[2, 3 * n + 2] = -z1
+        rows[2, 3 * n + 12] = -z2
+        rows[2, 3 * n + 14] = z0
+        rows[2, 3 * n + 24] = z1
+        rows[2, 3 * n + 25] = -z0
 
 
 @compiled(internal=True)
 def _add_tangent(  # type: ignore[no-untyped-def]
     slopes,
     shape,
-    blocks,
+    rows,
     matrix,
 ):
-    """Add the tangent of a Gauss point to the matrix (12, 12) of its element."""
+    """Add the tangent of a Gauss point to the matrix (4, 36) of its element; rows : (3, 36).
+
+    An inner loop over 36 numbers is what the compiler turns into vector instructions.
+    """
     for n in range(4):
         a = slopes[0, n]
         d = slopes[1, n]
-        for i in range(3):
-            for j in range(12):
-                matrix[3 * n + i, j] += (
-                    a * blocks.warp_row[i, j]
-                    + d * blocks.fill_row[i, j]
-                    + shape[n] * blocks.pressure[i, j]
-                )
+        share = shape[n]
+        for j in range(36):
+            matrix[n, j] += a * rows[0, j] + d * rows[1, j] + share * rows[2, j]
 
 
 @compiled()
@@ -472,17 +435,9 @@ def assemble(  # type: ignore[no-untyped-def]
     work = wrinkle_work()
     x = np.empty((4, 3))
     f = np.empty((2, 3))
-    matrix = np.empty((12, 12))
+    matrix = np.empty((4, 36))
     force = np.empty(12)
-    blocks = TangentBlocks(
-        np.empty((3, 3)),
-        np.empty((3, 3)),
-        np.empty((3, 3)),
-        np.empty((3, 3)),
-        np.empty((3, 12)),
-        np.empty((3, 12)),
-        np.empty((3, 12)),
-    )
+    rows = np.zeros((3, 36))
     largest = 0.0
     for e in range(quads.shape[0]):
         node_positions(position, quads, e, x)
@@ -519,18 +474,17 @@ def assemble(  # type: ignore[no-untyped-def]
                 largest,
             )
             if with_tangent:
-                _write_blocks(f, stiffness, wt, tension, blocks)
-                _write_rows(f, slopes, wp, blocks)
-                _add_tangent(slopes, shape, blocks, matrix)
+                _write_rows(f, slopes, stiffness, wt, tension, wp, rows)
+                _add_tangent(slopes, shape, rows, matrix)
         for n in range(4):
             for k in range(3):
                 residual[3 * quads[e, n] + k] += force[3 * n + k]
         if with_tangent:
-            for i in range(12):
-                for j in range(12):
-                    place = slot[e, 12 * i + j]
+            for n in range(4):
+                for j in range(36):
+                    place = slot[e, 36 * n + j]
                     if place >= 0:
-                        data[place] += matrix[i, j]
+                        data[place] += matrix[n, j]
     return largest
 
 

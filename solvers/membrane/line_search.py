@@ -8,6 +8,7 @@ increment of the law are nearly conservative.
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ class LineSearchSettings:
     #: or where the residual falls to this share, or was smaller than `small_residual` before.
     gain: float = 0.1
     small_residual: float = 1e-2
+    #: Above this residual contact that a step makes or ends is taken into account.
+    contact_above: float = 1e-3
     #: Above this residual nodes come into contact, so that the last factorisation is not tried.
     reused_below: float = 0.1
     #: After a step from a residual below `chord_below` the tangent stays, without assembly, as long
@@ -54,8 +57,15 @@ class LineSearchSettings:
 SETTINGS = LineSearchSettings()
 
 
+class ContactEquations(Equations, Protocol):
+    """Equations of equilibrium with contact."""
+
+    def step_into_contact(self, u: Array, step: Array) -> Array | None:
+        """See `ClosedMembrane.step_into_contact`."""
+
+
 def searched_equilibrium(
-    equations: Equations,
+    equations: ContactEquations,
     u: Array,
     pressure: float,
     settings: LineSearchSettings = SETTINGS,
@@ -64,7 +74,7 @@ def searched_equilibrium(
 
     Parameters
     ----------
-    equations : Equations
+    equations : ContactEquations
     u : (n, 3) array, mm
         Displacement to start from.
     pressure : float, MPa
@@ -95,7 +105,11 @@ def searched_equilibrium(
             step = _newton_step(equations, is_changed, solved_to)
         if step is None:
             return None
-        norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
+        search = LineSearch(equations, pressure, settings)
+        changed_norm = math.inf
+        if norm > settings.contact_above:
+            changed_norm = search.change_contact(u, step, norm)
+        norm = changed_norm if changed_norm < norm else search.advance(u, step, norm)
     return u if norm < tolerance else None
 
 
@@ -128,13 +142,41 @@ class LineSearch:
         interpolate.
     """
 
-    equations: Equations
+    equations: ContactEquations
     pressure: float
     settings: LineSearchSettings
     low: float = 0.0
     high: float = math.inf
     slope_low: float = math.nan
     slope_high: float = math.nan
+
+    def change_contact(self, u: Array, step: Array, norm: float) -> float:
+        """Move u (n, 3) by a step (free,) corrected for contact, if that reduces the residual.
+
+        Parameters
+        ----------
+        norm : float
+            Relative residual at the start.
+
+        Returns
+        -------
+        float
+            Relative residual at the end, or inf where u stays.
+        """
+        equations = self.equations
+        corrected = equations.step_into_contact(u, step)
+        if corrected is None or np.abs(corrected).max() > equations.step_limit:
+            return math.inf
+        unknowns = u.reshape(-1)
+        start = unknowns[equations.free].copy()
+        residual = equations.residual.copy()
+        unknowns[equations.free] = start + corrected
+        trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
+        if trial_norm < norm:
+            return trial_norm
+        unknowns[equations.free] = start
+        equations.residual[:] = residual
+        return math.inf
 
     def advance(self, u: Array, step: Array, norm: float) -> float:
         """Move u (n, 3) along a step (free,) by an accepted share of it.
