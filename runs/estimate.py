@@ -165,13 +165,8 @@ def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Esti
 def estimate_of(setup: FitSetup) -> Estimate:
     """Return the estimate of prepared tests; raises as `estimate`."""
     start_time = time.process_time()
+    problem, point, notes = _fit_all(setup)
     with one_blas_thread():
-        comparisons, notes = _comparisons(setup)
-        problem, point = _fit(setup, comparisons, {})
-        if len(comparisons) > 1:  # what each leaves is its noise, so that none outvotes the others
-            misfit_of = misfits(problem, point.residual).items()
-            noise_of = {name: max(misfit.rms, misfit.noise) for name, misfit in misfit_of}
-            problem, point = _fit(setup, comparisons, noise_of)
         law = problem.unknowns.law(problem.law, point.unknowns)
         best = BestFit(point, point, law, (), (), reached_by(point))
         best = replace(best, certainty=certainty(problem, point, law, best.valid))
@@ -197,6 +192,18 @@ def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[Note]]:
     if not comparisons:
         raise InputError(setup.project.path, "tests", f"no estimate: {notes[0]}")
     return [replace(comparison, nuisance=()) for comparison in comparisons], notes
+
+
+@one_blas_thread()
+def _fit_all(setup: FitSetup) -> tuple[FitProblem, Evaluation, list[Note]]:
+    """Fit the equations of all tests; notes are on those without. InputError, SolverFailure."""
+    comparisons, notes = _comparisons(setup)
+    problem, point = _fit(setup, comparisons, {})
+    if len(comparisons) > 1:  # what each leaves is its noise, so that none outvotes the others
+        misfit_of = misfits(problem, point.residual).items()
+        noise_of = {name: max(misfit.rms, misfit.noise) for name, misfit in misfit_of}
+        problem, point = _fit(setup, comparisons, noise_of)
+    return problem, point, notes
 
 
 def _fit(
@@ -259,7 +266,7 @@ def with_start(setup: FitSetup) -> FitSetup:
         return setup
     coefficients: Array | None
     try:
-        coefficients = estimate_of(setup).best.point.coefficients
+        coefficients = _fit_all(setup)[1].coefficients
     except (InputError, SolverFailure) as error:
         coefficients = closed_form_coefficients(setup)
         start = "all starts are" if coefficients is None else "starts after that in closed form are"
