@@ -158,7 +158,7 @@ class PreparedBiaxial(PreparedParts):
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the load paths of the test."""
-        return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
+        return _doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
 
 
 def first_row_errors(
@@ -231,7 +231,7 @@ class PathLimits:
 PATH_LIMITS = PathLimits()
 
 
-def doubts_of_paths(
+def _doubts_of_paths(
     paths: Sequence[BiaxialPath], thickness: float, expected: Expected
 ) -> list[Doubt]:
     """Return the doubts about the load paths of a test: units, ratios, moduli and swapped yarns.

@@ -324,7 +324,7 @@ class FieldObjective(Objective):
         """
         if not self.positions:
             return {}
-        slopes = slopes_by_cause(self.targets, history.displacement)
+        slopes = _slopes_by_cause(self.targets, history.displacement)
         return {cause: self.columns_of(parts) for cause, parts in slopes.items()}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns, history: History) -> Array:
@@ -385,7 +385,7 @@ PRESSURES = (
 )
 
 
-def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict[str, list[Array]]:
+def _slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict[str, list[Array]]:
     """Return what one unit of each cause adds to the model's field at the places of each target.
 
     Parameters

@@ -129,7 +129,7 @@ class PreparedReadings(PreparedInflation):
         return joined(self.readings.files)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        return doubts_of_readings(self.test, self.readings)
+        return _doubts_of_readings(self.test, self.readings)
 
 
 def prepare(
@@ -157,7 +157,7 @@ class PlausibleReadings:
 PLAUSIBLE = PlausibleReadings()
 
 
-def doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt]:
+def _doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt]:
     """Return the doubts about the readings of a test.
 
     Parameters

@@ -82,7 +82,7 @@ class DriftLimits:
 SLIP_LIMITS, DRIFT_LIMITS = SlipLimits(), DriftLimits()
 
 
-def history_doubts(
+def _history_doubts(
     history: LoadHistory,
     values: Sequence[CycleValues],
     stable: int,
@@ -279,7 +279,7 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
     values = [evaluate_cycle(history, cycle, level, zero) for cycle in found_cycles]
     stable = first_stable(values)
     notes = [Note(READING, words) for words in history.notes]
-    for kind, words in history_doubts(history, values, stable, level):
+    for kind, words in _history_doubts(history, values, stable, level):
         notes.append(Note(kind, words, history.path.name))
     return EvaluatedHistory(
         history=history,

@@ -322,7 +322,7 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
     matched: dict[str, Compared] = {}
     for number, compare in enumerate(section.compare):
         at = f"compare[{number}]"
-        compared = read_compared(compare, place, at, section.folder)
+        compared = _read_compared(compare, place, at, section.folder)
         if matched.setdefault(compared.name, compared) is not compared:
             raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
     parameters = _unknowns(section, place)
@@ -425,7 +425,7 @@ class Compared:
     data: tuple[DataFile, ...]
 
 
-def read_compared(section: CompareSection, place: Place, at: str, folder: str) -> Compared:
+def _read_compared(section: CompareSection, place: Place, at: str, folder: str) -> Compared:
     """Read measured values of all files; InputError where files, columns, or keys are wrong.
 
     Parameters
@@ -449,7 +449,7 @@ def _read_curve(section: CompareSection, place: Place, at: str, paths: list[Path
     if section.x is None or section.y is None:
         raise place.error(at, 'expected x and y, or quantity = "displacement" with set and times')
     axes = {"elongation": section.x, "load": section.y}
-    probes = probe_of(section.x, place, f"{at}.x"), probe_of(section.y, place, f"{at}.y")
+    probes = _probe_of(section.x, place, f"{at}.x"), _probe_of(section.y, place, f"{at}.y")
     named = {quantity: axis.column for quantity, axis in axes.items() if axis.column}
     columns = []
     data = []
@@ -507,7 +507,7 @@ def _numbers(table: MachineTable, column: str, quantity: str, unit: str | None) 
     return table.values(column, UNITS[quantity], Channel(unit=unit))
 
 
-def probe_of(section: QuantitySection, place: Place, at: str) -> Probe:
+def _probe_of(section: QuantitySection, place: Place, at: str) -> Probe:
     """Return the number of the results that a section describes; InputError."""
     keys = ("displacement", "reaction", "time", "result")
     chosen = [key for key in keys if getattr(section, key) is not None]

@@ -141,7 +141,7 @@ class DeckModel:
         if self.geometry:
             with input_errors(self.folder / self.geometry):
                 content = read_bytes(self.folder / self.geometry)
-            files[Path(self.geometry).with_suffix(".inp").name] = mesh_of(content)
+            files[Path(self.geometry).with_suffix(".inp").name] = _mesh_of(content)
         return UserDeck(files, self.reader, words, self.timeout, mark)
 
     def _named(self, text: str) -> dict[str, bytes]:
@@ -216,7 +216,7 @@ gmsh.write("mesh.inp")
 
 
 @lru_cache(maxsize=8)
-def mesh_of(geometry: bytes) -> bytes:
+def _mesh_of(geometry: bytes) -> bytes:
     """Return the mesh of a geometry as a CalculiX or Abaqus input file.
 
     Physical groups become element sets and node sets. Raise InputError where gmsh fails.
