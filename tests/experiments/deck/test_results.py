@@ -123,6 +123,7 @@ def test_time_series_of_xdmf_has_its_times_and_single_precision(tmp_path):
 def test_missing_package_is_named(tmp_path, monkeypatch, package, result):
     mesh = meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], {"triangle": [[0, 1, 2]]})
     (tmp_path / result).write_text("")
+    monkeypatch.chdir(tmp_path)  # where meshio writes the numbers of an .xdmf file
     if package == "h5py":
         with meshio.xdmf.TimeSeriesWriter(tmp_path / result) as writer:
             writer.write_points_cells(mesh.points, mesh.cells)
