@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -358,7 +359,10 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
 
 
 def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
-    """Return a project of one cylinder; errors name the option instead of a key."""
+    """Return a project of one cylinder with the thickness of the first card.
+
+    Every card is run with its own thickness. Errors name the option instead of a key.
+    """
     from ..project.project import project_of
 
     thickness = next(iter(cards.values())).thickness
@@ -368,7 +372,8 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
     except InputError as error:
         if error.path != NO_FILE:
             raise
-        key = error.field.removeprefix(f"{CYLINDER}[0].").split("[")[0]
+        key = re.split(r"[.\[]", error.field.removeprefix(f"{CYLINDER}[0]."))[0]
+        key = "card" if key == "fabric" else key
         raise InputError(None, f"--{key.replace('_', '-')}", error.problem) from None
 
 

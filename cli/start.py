@@ -355,7 +355,7 @@ def _text_for_data(
             continue
         values["recorded"] = _loaded_pressures(test.pressures)
         if test.of_clamp:
-            sizes |= {"radius": round(test.outline.radius, 2), "radius_found": True}
+            values |= {"radius": round(test.outline.radius, 2), "radius_found": True}
     law = {} if without_cameras and "radius" in open_sizes else _law_for_data(project)
     if without_cameras:
         law["form"] = "constant"

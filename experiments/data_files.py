@@ -67,7 +67,8 @@ def joined(parts: Iterable[DataFile]) -> list[DataFile]:
     for part in parts:
         file = files.get(part.path, DataFile(part.path, part.source, None))
         dropped = Counter(file.dropped) + Counter(part.dropped)
-        used_count = (file.used_count or 0) + (part.used_count or 0)
+        counts = [count for count in (file.used_count, part.used_count) if count is not None]
+        used_count = sum(counts) if counts else None
         arrays = (*file.arrays, *part.arrays)
         files[part.path] = DataFile(part.path, file.source, used_count, dict(dropped), arrays)
     return list(files.values())

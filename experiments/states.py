@@ -17,8 +17,9 @@ from ..readers.histories import Pace
 from .base import Test
 
 STATES = NoteKind("tests in different states", weight=9)
-#: How strips say that they were not conditioned.
-WITHOUT_CONDITIONING = frozenset(("none", "no", "0", "without", "keine", "ohne"))
+#: How strips say that they were not conditioned: in all, or by their first word.
+WITHOUT_CONDITIONING = frozenset(("none", "0", "virgin", "new", "unconditioned", "nein", "neu"))
+NEGATIONS = frozenset(("no", "not", "without", "kein", "keine", "nicht", "ohne"))
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ def state_from_conditioning(conditioning: str | None) -> State:
     """Return the state of a fabric from a project's words for its conditioning; "" without any."""
     if conditioning is None:
         return ""
-    is_new = conditioning.strip().casefold() in WITHOUT_CONDITIONING
+    text = conditioning.strip().casefold()
+    is_new = text in WITHOUT_CONDITIONING or text.split(" ")[0] in NEGATIONS
     return "first loading" if is_new else "conditioned"
 
 

@@ -346,7 +346,7 @@ class BeamModel:
     friction: float = 0.0
     size: float = 25.0
     increments: Sequence[float] = ()
-    reading: CurveReading = None  # type: ignore[assignment]
+    reading: CurveReading = field(default=None, repr=False)  # type: ignore[assignment]
     mesh: Mesh = field(init=False, repr=False)
     copies: ClassVar[int] = 4
 

@@ -322,14 +322,14 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
     Parameters
     ----------
     paths : mapping or DataFrame
-        By load ratio an (n, 4) array or a DataFrame with the loads along warp and fill (N/mm) and
-        the strains along warp and fill (mm/mm); or one DataFrame of all readings, optionally with a
-        column ratio.
+        By load ratio warp:fill, a str such as "2:1", an (n, 4) array or a DataFrame with the loads
+        along warp and fill (N/mm) and the strains along warp and fill (mm/mm); or one DataFrame of
+        all readings, optionally with a column ratio.
 
     Raises
     ------
     InputError
-        A table has other columns, or a number that is not finite.
+        A table has other columns, a number that is not finite, or a ratio that is no text.
     """
     tables = {"": paths} if is_table(paths) else paths
     if not isinstance(tables, Mapping):
@@ -337,6 +337,9 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
         raise InputError(None, "paths", problem)
     records = []
     for k, (ratio, table) in enumerate(tables.items(), start=1):
+        if not isinstance(ratio, str) or not (ratio or is_table(paths)):
+            problem = f"expected load ratios warp:fill as text, such as '2:1', got {ratio!r}"
+            raise InputError(None, "paths", problem)
         argument = f"paths[{ratio!r}]" if ratio else "paths"
         values = _columns(argument, table, BIAXIAL_COLUMNS).T
         ratios = (ratio,) * len(values) if ratio else None

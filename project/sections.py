@@ -14,6 +14,7 @@ import tomli_w
 
 from ..errors import InputError, Problems
 from ..experiments.base import Kind, LedTest, Test, with_defaults
+from ..experiments.data_files import Output
 from ..experiments.registry import kind_names, kinds
 from ..experiments.sections import ObjectPlace, Place
 from ..light_dataclasses import dataclass
@@ -238,6 +239,11 @@ class TestsOfFile:
                 if name in tests:
                     problem = f"{name!r} is there twice; give one of them another name"
                     raise place.error("name", problem)
+                prefix = _prefix_of_files(name)
+                for other in tests:
+                    if _prefix_of_files(other) == prefix:
+                        problem = f"files of this test and of {other!r} would begin alike"
+                        raise place.error("name", f"{problem}, {prefix!r}; give it another name")
                 with self.problems.collected():
                     tests[name] = self._read_test(kind, sections[number], place, name, number)
         by_name = {name: read_test.test for name, read_test in tests.items()}
@@ -289,6 +295,11 @@ class TestsOfFile:
             for folder_key in kind.folder_key.split():
                 as_run = with_full_folder(as_run, folder_key, self.place.path.parent, folder)
         return ReadTest(test, section, as_run, definition)
+
+
+def _prefix_of_files(test: str) -> str:
+    """Return how the names of a test's files begin, by the test's name."""
+    return Output.of(Path(), test, several=True).prefix
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:

@@ -455,7 +455,7 @@ def frame_files(
         if file in files[:i]:
             raise InputError(file, field, "is given twice")
     by_number = sorted(files, key=_number_key)
-    is_expanded = list(map(str, files)) == names
+    is_expanded = files == list(map(Path, names))
     if not is_expanded or files == by_number or files != sorted(files, key=str):
         return files, None
     first, expected = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)

@@ -322,21 +322,28 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
 def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
     """Return the first and last row of each slow stretch, counted from the first of `rows`.
 
+    Of readings with the same time, as of a clock of whole seconds, the first counts.
+
     Speed is the length of the curve of load over strain that is covered per second, with load and
     strain each divided by its range.
     """
     if history.time is None or not np.ptp(history.strain[rows]) > 0:
         return []
-    load = history.load[rows] / np.ptp(history.load[rows])
-    strain = history.strain[rows] / np.ptp(history.strain[rows])
+    time = history.time[rows]
+    numbers = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0)
+    load = history.load[rows][numbers] / np.ptp(history.load[rows])
+    strain = history.strain[rows][numbers] / np.ptp(history.strain[rows])
     length = np.hypot(np.diff(load), np.diff(strain))
-    speed = length / np.maximum(np.diff(history.time[rows]), 1e-9)
+    if not length.sum() > 0:
+        return []
+    speed = length / np.diff(time[numbers])
     # The usual speed is the median over the length of the curve, not over time: long holds cover
     # hardly any length.
     order = np.argsort(speed)
     usual = speed[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum())]
     is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
-    return np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
+    ends = np.flatnonzero(is_slow[1:] != is_slow[:-1])
+    return numbers[ends].reshape(-1, 2).tolist()
 
 
 @dataclass(frozen=True)

@@ -246,7 +246,10 @@ class MachineTable:
         )
 
     def times(self) -> Array | None:
-        """Return the first column of times (s) that never fall; None where the table has none."""
+        """Return the first column of times (s) that never fall; None where the table has none.
+
+        Raise InputError where the times of a column that the options name fall.
+        """
         for index in columns_of(self.names, "time", self.options.columns):
             try:
                 times = self.values(self.names[index], TIME_UNITS)
@@ -256,6 +259,9 @@ class MachineTable:
                 continue
             if (np.diff(times) >= 0).all():
                 return times
+            if "time" in self.options.columns:
+                problem = "these times fall, as of a clock that restarts with each cycle"
+                raise self.error(self.names[index], f"{problem}; name times of the whole test")
         return None
 
 

@@ -233,7 +233,9 @@ def simulate(
         (test,) = Project.of(test, fabric=fabric, need_data=False).tests.values()
     usable = usable_solver(solver, options, cache=run_cache())
     if isinstance(test, ProgramTest):
-        usable = test.solver(lambda name: usable_solver(name, cache=run_cache()))
+        usable = test.solver(
+            lambda name: usable_solver(name, options if name == solver else {}, cache=run_cache())
+        )
     check_carries(usable, card.law)
     models = _at_parameters(test, card).models(card.thickness)
     histories = Histories()

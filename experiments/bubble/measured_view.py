@@ -97,9 +97,11 @@ class OutlierSearch:
     """Settings of the search for gross outliers about a smooth surface."""
 
     deviations: float = 10.0  # distance from the surface in robust standard deviations, and ...
+    first_deviations: float = 4.0  # the same while outliers still spoil the surface
+    first_rounds: int = 3
     rise_share: float = 0.02  # ... as a share of the highest rise: an outlier exceeds both
     degree: int = 8  # degree of the polynomial surface
-    rounds: int = 5  # largest number of times that outliers are left out and the fit is repeated
+    rounds: int = 8  # largest number of times that outliers are left out and the fit is repeated
     disk_share: float = 0.95  # points within this share of the radius are judged
     max_points: int = 4000  # about the largest number of points judged in a frame, evenly thinned
 
@@ -308,7 +310,9 @@ class MeasuredView:
         distance = np.zeros_like(displacement)
         deviation = np.zeros(3)
         radius = self.outline.major
-        for _ in range(OUTLIERS.rounds):
+        for number in range(OUTLIERS.rounds):
+            is_first = number < OUTLIERS.first_rounds
+            deviations = OUTLIERS.first_deviations if is_first else OUTLIERS.deviations
             try:
                 surface = fit_disk_polynomial(
                     points[is_kept], displacement[is_kept], radius, OUTLIERS.degree
@@ -317,11 +321,9 @@ class MeasuredView:
                 return GrossOutliers(field, 0, len(points), 0.0, 0.0, is_outlying)
             distance = np.abs(displacement - surface.values_at(points))
             deviation = SIGMA_PER_MAD * np.median(distance[is_kept], axis=0)
-            largest = np.maximum(
-                OUTLIERS.deviations * deviation, OUTLIERS.rise_share * self.rises.max()
-            )
+            largest = np.maximum(deviations * deviation, OUTLIERS.rise_share * self.rises.max())
             is_close = (distance <= largest).all(axis=1)
-            if (is_close == is_kept).all():
+            if not is_first and (is_close == is_kept).all():
                 break
             is_kept = is_close
         of_all = np.abs(

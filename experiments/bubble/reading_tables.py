@@ -109,6 +109,9 @@ def _check_nuisance(section: BubbleSection, place: Place) -> None:
     for key, is_set in keys_of_fields.items():
         if is_set:
             raise place.error(key, "needs fields of a camera, and there are tables of readings")
+    if section.data.apex is not None and section.sheet.modes:
+        problem = "cannot be told from readings of the apex: its curvature at rest is not measured"
+        raise place.error("sheet.modes", problem)
 
 
 def _heights(
@@ -140,6 +143,10 @@ def _profiles(
     tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
     if not tables:
         return []
+    for column in ("pressure", "axis"):
+        if len({column in table for table in tables}) > 1:
+            problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
+            raise place.error("data.profiles.files", f"{problem} or in none")
     if "pressure" not in tables[0]:
         if pressures is None or len(pressures) != len(tables):
             problem = f"expected one for each of {len(tables)} tables without such a column"
@@ -151,14 +158,24 @@ def _profiles(
         points = points.assign(axis=str(section.direction_deg))
     series = []
     for axis, line in points.groupby("axis", sort=False):
-        name = str(axis).lower()
-        angle = np.radians(AXES[name] if name in AXES else float(name))
+        angle = np.radians(_direction_of_line(str(axis).lower(), place))
         profiles = [_thinned(profile) for _, profile in line.groupby("pressure")]
         table = pd.concat(profiles)
         positions = np.outer(table["coordinate"], [np.cos(angle), np.sin(angle)])
         heights = _series("height", f"heights along {axis}", table, "height", positions)
         series.append(replace(heights, moves_with_sheet=section.moves_with_sheet))
     return series
+
+
+def _direction_of_line(name: str, place: Place) -> float:
+    """Return the direction of a line in degrees from the warp, by what a column says of it."""
+    if name in AXES:
+        return AXES[name]
+    try:
+        return float(name)
+    except ValueError:
+        problem = f"expected x, y or degrees from the warp in this column, got {name!r}"
+        raise place.error("data.profiles.columns.axis", problem) from None
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:
@@ -224,6 +241,9 @@ def _tables(
         Dotted key of the section below the test's.
     """
     if section.values is not None:
+        for unit in sorted(name for name in section.model_fields_set if name.endswith("_unit")):
+            problem = "is of files; values are in the units of the project, 1/mm and mm/mm"
+            raise place.error(f"{key}.{unit}", problem)
         return [_typed_table(section.values.model_dump(exclude_none=True), place, key, quantities)]
     tables = []
     for path in _files(section, place, key):

@@ -492,8 +492,11 @@ def _hold_row(evaluated: EvaluatedHistory, hold: Hold) -> dict[str, Any]:
     }
     readings = {"strain": history.strain[rows] - evaluated.zero, "load_N": history.load[rows]}
     for name, values in readings.items():
-        # The fit over the logarithm of time begins at the second reading: the first is at zero.
-        slope = np.polyfit(np.log10(duration[1:]), values[1:], 1)[0]
+        # Readings at the time at which the hold begins have no place on a logarithmic scale.
+        is_later = duration > 0
+        slope = math.nan
+        if len(np.unique(duration[is_later])) > 1:
+            slope = np.polyfit(np.log10(duration[is_later]), values[is_later], 1)[0]
         row |= {
             f"{name}_before": values[0],
             f"{name}_after": values[-1],

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...notes import Note
-from ...readers.histories import Cycle, Hold, LoadHistory, passage
+from ...readers.histories import RATE_LEVELS, Cycle, Hold, LoadHistory, passage
 from ...solvers.base import Array
 
 
@@ -289,13 +289,14 @@ def _crossing(
 
 
 def _rate(history: LoadHistory, rows: slice) -> float:
-    """Return the median rate of load, N/s, in the upper half of a branch."""
-    load = history.load[rows]
-    if history.time is None or len(load) < 3:
+    """Return the mean rate of load, N/s, of a branch between `RATE_LEVELS` of its peak."""
+    if history.time is None:
         return math.nan
-    is_upper = load[1:] > 0.5 * load.max()
-    rate = np.diff(load)[is_upper] / np.maximum(np.diff(history.time[rows])[is_upper], 1e-9)
-    return float(np.median(np.abs(rate))) if len(rate) else math.nan
+    load = history.load[rows]
+    levels = np.array(RATE_LEVELS) * load.max()
+    times = [passage(load, history.time[rows], level)[1] for level in levels]
+    duration = abs(times[1] - times[0])
+    return float((levels[1] - levels[0]) / duration) if duration > 0 else math.nan
 
 
 def has_same_peak(values: CycleValues, previous: CycleValues) -> bool:

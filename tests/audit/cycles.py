@@ -87,13 +87,12 @@ def values_of(time, load, strain, reference):
 
 
 def rate(time, load, rows):
-    """Return the median rate of load in the upper half of a branch, N/s."""
-    if time is None or len(load[rows]) < 3:
+    """Return the rate of load of a branch from 40 to 90 % of its peak or back, N/s."""
+    if time is None:
         return math.nan
-    own = load[rows]
-    above = own[1:] > 0.5 * own.max()
-    steps = np.diff(own)[above] / np.diff(time[rows])[above]
-    return float(np.median(np.abs(steps)))
+    top = load[rows].max()
+    at = [passage(load[rows], time[rows], share * top)[0] for share in (0.4, 0.9)]
+    return 0.5 * top / abs(at[1] - at[0])
 
 
 def stable_of(table):

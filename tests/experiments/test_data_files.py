@@ -39,7 +39,7 @@ def test_entries_of_a_file_are_joined_and_their_rows_added():
     ]
     first, second = joined(parts)
     assert (first.path, first.used_count, first.dropped) == (a, 7, {"all zero": 3, "flagged": 1})
-    assert (second.path, second.used_count, second.dropped) == (b, 0, {})
+    assert (second.path, second.used_count, second.dropped) == (b, None, {})
 
 
 @pytest.mark.parametrize("name", ["bubble 1", "a/b", "a:b", "..", "strip é", 200 * "x"])

@@ -26,6 +26,18 @@ def test_state_of_a_card_is_that_of_its_strips():
     assert (state(third), state(bubble, third)) == ("conditioned", "")
 
 
+@pytest.mark.parametrize(
+    ("words", "state"),
+    [
+        ("none", "first loading"), ("No conditioning", "first loading"), ("nein", "first loading"),
+        ("not conditioned", "first loading"), ("virgin", "first loading"), ("", "conditioned"),
+        ("new fabric, 3 cycles", "conditioned"), ("northern room", "conditioned"),
+    ],
+)  # fmt: skip
+def test_words_of_conditioning_are_understood(words, state):
+    assert state_from_conditioning(words) == state
+
+
 PACED = """
 [fabric]
 name = "made"

@@ -123,6 +123,16 @@ def test_gross_outliers_are_counted(clean_bubble, share, size):
         assert float(most) == pytest.approx(size, rel=0.1)
 
 
+@pytest.mark.parametrize("size", [5.0, 10.0, 15.0])
+def test_outliers_of_one_sense_do_not_hide_each_other(clean_bubble, size):
+    rng, fields = np.random.default_rng(3), noisy(clean_bubble, 0.01)
+    count = round(0.08 * len(clean_bubble[0].points))
+    for field in fields:
+        inner = np.flatnonzero(np.hypot(*field.points.T) < 90)
+        field.displacement[rng.choice(inner, count, replace=False), 2] += size
+    assert f"{count} of " in doubts_by_name(fields)["outliers"].text
+
+
 @pytest.mark.parametrize(("height", "doubt"), [(0.0, False), (0.5, False), (4.0, True)])
 def test_measured_heights_taken_for_flat_are_doubted(clean_bubble, height, doubt):
     """A dome on a sheet that is tilted and far from the camera's zero: the plane is no shape."""

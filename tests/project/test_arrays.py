@@ -5,11 +5,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.project.arrays import biaxial_tables_of_arrays
 
 from ..builders.measured_arrays import project_of
 from ..builders.projects import fit_setup
 from ..support.paths import EXAMPLES
-from ..support.refusals import raised, refused
+from ..support.refusals import complaint, raised, refused
 
 
 def test_arrays_lists_and_tables_make_the_same_bubble(arrays):
@@ -99,3 +100,9 @@ def test_biaxial_and_cylinder_tests_are_made_of_arrays(tmp_path):
     assert read.measured[0].load.tolist() == [0.0, 180.0]
     assert bf.read(file)["load"].tolist() == [0.0, 180.0]
     raised(InputError, r"^pressure: .*kPa", bf.Cylinder, 150.0, 90.0)
+
+
+@pytest.mark.parametrize("ratio", [1, 0, "", (1, 1)])
+def test_load_ratio_that_is_no_text_is_refused(ratio):
+    said = complaint(biaxial_tables_of_arrays, {ratio: np.ones((5, 4))})
+    assert "expected load ratios warp:fill as text, such as '2:1'" in said

@@ -306,7 +306,17 @@ APEX = {
         },
     }
 }
+NAMED = {"columns": {"curvature_warp": "k", "strain_warp": "e"}}
+#: Units are of tables in files.
+TABLES_IN_FILES = {
+    f"bubble.data.{table}.{unit}_unit": {
+        "data": {"points": None, table: {"files": ["a"], **(NAMED if table == "apex" else {})}}
+    }
+    for table in ("heights", "profiles", "apex")
+    for unit in ("pressure", "length", "curvature", "strain")
+}
 COMPANIONS = {
+    **TABLES_IN_FILES,
     "cycles.files.bias": {"gauge_length": 0.02},
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
     "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},

@@ -12,6 +12,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 
 from ..builders.measured_arrays import FABRIC, project_of
+from ..builders.projects import constant_strips
 from ..support.paths import EXAMPLES, KNOWN
 from ..support.refusals import complaint, refused
 
@@ -79,3 +80,12 @@ def test_data_folders_are_given_by_test(tmp_path):
     for folder in (tmp_path, {"bubble": tmp_path}):  # computed data read none
         said = complaint(read_project, KNOWN, folder)
         assert "known_solution" in said and "--data" in said
+
+
+def test_tests_whose_files_would_have_the_same_names_are_refused(tmp_path):
+    strips = constant_strips(tmp_path).read_text()
+    assert 'name = "two"' in strips
+    path = tmp_path / "alike.toml"
+    path.write_text(strips.replace('"two"', '"strip 1"').replace('"one"', '"strip-1"'))
+    said = complaint(read_project, path)
+    assert "name: files of this test and of " in said and "begin alike, 'strip-1-'" in said

@@ -173,3 +173,14 @@ def test_apex_height_is_a_high_quantile_of_the_points():
     # 98 % of points evenly along a cone moved less than 98 % of its height.
     assert apex_height(frame) == pytest.approx(49.0, abs=0.1)
     assert np.isnan(apex_height(Frame(np.zeros((2, 3)), np.full((2, 3), np.nan))))
+
+
+@pytest.mark.parametrize("before", ["", "./"])
+def test_frames_in_the_order_of_a_shell_are_noted_wherever_their_names_begin(
+    tmp_path, monkeypatch, before
+):
+    monkeypatch.chdir(tmp_path)
+    for number in (1, 2, 10):
+        (tmp_path / f"t_{number}.csv").write_text("x\n")
+    _, note = frame_files([f"{before}t_{number}.csv" for number in (1, 10, 2)], "files")
+    assert note is not None and "t_10.csv before t_2.csv" in note

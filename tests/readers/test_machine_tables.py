@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers.histories import read_pressure_log
+from bubblefit.readers.histories import read_history, read_pressure_log
 from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads, read_times
 from bubblefit.readers.units import PRESSURE_UNITS
 
@@ -125,6 +125,13 @@ def test_times_are_read_in_their_unit(export_file, text, expected):
         np.testing.assert_allclose(read_times(export_file), expected, rtol=1e-14)
     else:
         complaint_with([expected, str(export_file)], read_times, export_file)
+
+
+def test_times_of_a_column_that_the_user_names_must_not_fall(export_file):
+    export_file.write_text("Cycle time (s),Load (N),Strain (%)\n0,1,0\n1,2,1\n0,1,0\n1,3,2\n")
+    assert read_history(export_file).time is None
+    said = complaint(read_history, export_file, columns={"time": "Cycle time (s)"})
+    assert "these times fall, as of a clock that restarts" in said
 
 
 def test_loads_are_read_without_elongation(export_file):

@@ -192,3 +192,49 @@ def test_curvature_of_the_apex_of_any_sign_half_of_it_or_the_radius(tmp_path, ke
     np.testing.assert_allclose(bent.value, curvature)
     np.testing.assert_allclose(strained.value, np.expm1(1e-4 * RISE))
     assert (bent.direction, strained.direction[1], bent.span) == ((1.0, 0.0), 1.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "quantity", "unit"),
+    [
+        ("apex", "curvature_warp", 'curvature_unit = "1/m"'),
+        ("apex", "strain_fill", 'strain_unit = "%"'),
+        ("heights", "height", 'length_unit = "cm"'),
+        ("heights", "height", 'pressure_unit = "bar"'),
+    ],
+)
+def test_unit_beside_values_of_the_project_is_refused(tmp_path, kind, quantity, unit):
+    values = f"values = {{ pressure = [10, 40], {quantity} = [1.0, 2.0] }}\n"
+    text = f"{PROJECT}[bubble.data.{kind}]\n{values}"
+    assert len(bubble_of(tmp_path, text).data.series[0].value) == 2
+    said = refusal(tmp_path, text + unit + "\n")
+    assert f"data.{kind}.{unit.split()[0]}: is of files" in said
+
+
+def test_modes_of_the_sheet_are_refused_beside_readings_of_the_apex(tmp_path):
+    values = "values = { pressure = [10, 40], curvature_warp = [1e-3, 2e-3] }\n"
+    text = f"{PROJECT}[bubble.data.apex]\n{values}[bubble.sheet]\nmodes = 2\n"
+    assert "sheet.modes: cannot be told from readings of the apex" in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "column"),
+    [("p (kPa),s (mm),dz (mm)", "10,", "pressure"), ("axis,s (mm),dz (mm)", "x,", "axis")],
+)
+def test_column_that_only_some_profiles_have_is_refused(tmp_path, heading, cells, column):
+    places = range(-90, 91, 10)
+    bare = "s (mm),dz (mm)\n" + "\n".join(f"{s},{9 - s * s / 900}" for s in places)
+    (tmp_path / "bare.csv").write_text(bare)
+    rows = "\n".join(f"{cells}{s},{9 - s * s / 900}" for s in places)
+    (tmp_path / "full.csv").write_text(f"{heading}\n{rows}\n")
+    for files in (["full.csv", "bare.csv"], ["bare.csv", "full.csv"]):
+        text = PROJECT.replace("radius", "pressures = [10, 40]\nradius")
+        text += f"[bubble.data.profiles]\nfiles = {files}\n"
+        assert f"a column of the {column} in all tables" in refusal(tmp_path, text)
+
+
+def test_direction_of_a_line_that_is_no_angle_is_refused(tmp_path):
+    rows = "\n".join(f"diagonal,10,{s},{9 - s * s / 900}" for s in range(-90, 91, 10))
+    (tmp_path / "p.csv").write_text(f"axis,p (kPa),s (mm),dz (mm)\n{rows}\n")
+    text = PROJECT + '[bubble.data.profiles]\nfiles = ["p.csv"]\n'
+    assert "expected x, y or degrees from the warp" in refusal(tmp_path, text)

@@ -81,3 +81,19 @@ def test_stable_cycle_is_the_first_that_repeats(tmp_path):
     )
     assert cycles(path).histories[0].stable_cycle == 4
     assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned"]
+
+
+def test_rates_are_those_of_the_ramps_with_a_hold_and_a_clock_of_whole_seconds(tmp_path):
+    """1,000 N in 20 s up and down, with 30 s at the top, read ten times a second."""
+    time = np.arange(0.0, 70.0, 0.1)
+    load = np.interp(time, [0.0, 20.0, 50.0, 70.0], [0.0, 1000.0, 1000.0, 0.0])
+    strain = 1e-5 * load + np.interp(time, [20.0, 50.0], [0.0, 2e-3])
+    head = ["Time (s),Load (N),Strain (mm/mm)"]
+    for name, clock in (("tenths", time), ("seconds", np.floor(time + 1e-6))):
+        path = write_history(tmp_path / f"{name}.csv", head, (clock, load, strain))
+        found = cycles(path, reference_load=10.0)
+        assert found.table["loading_N_per_s"][0] == pytest.approx(50.0, rel=0.1)
+        assert found.table["unloading_N_per_s"][0] == pytest.approx(50.0, rel=0.1)
+        (hold,) = found.holds.to_dict("records")
+        assert hold["at"] == "top" and hold["duration_s"] == pytest.approx(30.0, abs=1.5)
+        assert np.isfinite(hold["strain_per_decade"])
