@@ -13,8 +13,8 @@ from ..base import EARLY, SNAP, History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
 from .loading import Loading, NoEquilibrium, RunRequest, march, straight_on
-from .neighbours import Neighbours
 from .relaxation import settled
+from .sensitivity import Neighbours
 
 #: Kinds of notes on a bending.
 PENETRATION = NoteKind("penetration")

@@ -19,7 +19,6 @@ from ..base import History
 from ..pretension import stretched
 from .cords import cords_on_sheet
 from .factorisation import SingularTangent, tangent_for
-from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import (
     IncrementRecord,
@@ -31,7 +30,7 @@ from .loading import (
     march,
     monotonic_count,
 )
-from .membrane import Array, Membrane, arrays_of
+from .membrane import Array, Membrane, arrays_of, initial_moduli
 from .sensitivity import Derivatives
 from .wall import TENSION_FIELD, Wall
 

@@ -19,10 +19,9 @@ from .contact import contact_forces
 from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, by_near_inverse, tangent_for
 from .flexure import Flexure, flexure_of
-from .initial_stiffness import initial_stiffness, refuse_memory
 from .kernel import reference_elements
 from .line_search import searched_equilibrium
-from .membrane import Membrane, arrays_of
+from .membrane import Membrane, arrays_of, initial_stiffness, refuse_memory
 from .wall import STIFF, Wall
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Array, Numbers
-from .initial_stiffness import initial_stiffness
+from .membrane import initial_stiffness
 
 #: Cosine of the largest angle by which a line of the mesh may turn at a node. A sharper edge, like
 #: the rim of a cap, is a seam that transfers no moment.

@@ -9,10 +9,9 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Array
 from ...meshes.strip_models import TubeModel
 from ..base import History
-from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import IncrementRecord, RunRequest
-from .membrane import Membrane, arrays_of
+from .membrane import Membrane, arrays_of, initial_moduli
 from .sensitivity import Derivatives
 from .wall import Wall
 

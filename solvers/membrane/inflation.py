@@ -15,10 +15,10 @@ from ...notes import Note
 from ..base import SNAP, History
 from . import bending
 from .closed import ClosedMembrane, closed_membrane
-from .initial_stiffness import initial_moduli
 from .loading import IncrementRecord, Loading, RunRequest, march, reach_in_halves, straight_on
-from .neighbours import Neighbours
+from .membrane import initial_moduli
 from .relaxation import settled
+from .sensitivity import Neighbours
 from .wall import LEFT
 
 Array = NDArray[np.float64]

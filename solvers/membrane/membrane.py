@@ -1,7 +1,8 @@
 """A membrane of quads during an increment: its strain, stress, residual force and tangent.
 
 Strain and stress become the start of the next increment only where a load of the model is reached,
-so that the result does not depend on the intermediate steps by which it was found.
+so that the result does not depend on the intermediate steps by which it was found. Laws that an
+analysis cannot apply, as without stiffness at zero strain, are refused.
 """
 
 from dataclasses import dataclass, field
@@ -207,3 +208,40 @@ def arrays_of(mesh: Mesh) -> tuple[Array, NDArray[np.int64]]:
     """Return points (n, 3) and quads (m, 4) of a mesh in the types of compiled functions."""
     points = np.array(mesh.points, dtype=float)
     return points, np.ascontiguousarray(mesh.quads, dtype=np.int64)
+
+
+def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
+    """Return the moduli E1, E2, G12 (MPa) at zero strain.
+
+    SolverFailure if one of them is not positive, since then there is no equilibrium.
+    """
+    e1, e2, g12 = (float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12))
+    if not min(e1, e2, g12) > 0:
+        raise SolverFailure(
+            "no equilibrium at all: E1, E2, G12 at zero strain are "
+            f"{e1:.3g}, {e2:.3g}, {g12:.3g} MPa and must be positive"
+        )
+    return e1, e2, g12
+
+
+def initial_stiffness(law: HypoelasticLaw) -> NDArray[np.float64]:
+    """Return the plane stress stiffness (3, 3) at zero strain, MPa; fails as `initial_moduli`."""
+    initial_moduli(law)
+    none = np.zeros(3)
+    _, tangent = law.increment(none, none, none)
+    return tangent[0]
+
+
+def refuse_memory(law: HypoelasticLaw, description: str) -> None:
+    """Raise SolverFailure if a law has a memory, for an analysis that cannot take it into account.
+
+    Parameters
+    ----------
+    description : str
+        The analysis in words, for the message.
+    """
+    if law.memory is not None:
+        losses = "unloading, permanent set and hysteresis are lost"
+        raise SolverFailure(
+            f"{description} takes no law with a memory ({losses}): use the card without it"
+        )

@@ -10,8 +10,8 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel
 from ..base import History
-from .initial_stiffness import refuse_memory
 from .loading import RunRequest
+from .membrane import refuse_memory
 from .wall import Wall
 
 

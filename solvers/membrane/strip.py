@@ -19,7 +19,6 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
 from .factorisation import AroundTangent, SingularTangent, tangent_for
-from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import (
     IncrementRecord,
@@ -30,7 +29,7 @@ from .loading import (
     load_labels,
     monotonic_count,
 )
-from .membrane import Array, Membrane, arrays_of
+from .membrane import Array, Membrane, arrays_of, initial_moduli
 from .sensitivity import Derivatives
 from .wall import Wall
 

@@ -1,4 +1,4 @@
-"""solvers/membrane/sensitivity.py: derivatives of bubbles, sheets and strips."""
+"""solvers/membrane/sensitivity.py: derivatives of bubbles, sheets, strips, closed membranes."""
 
 from dataclasses import replace
 
@@ -12,6 +12,8 @@ from bubblefit.meshes.bubble_model import SLACK, TENSION, BubbleModel, SheetCord
 from bubblefit.meshes.cylinder_model import ForceTable, axial_table
 from bubblefit.meshes.disk import disk_mesh, disk_modes, metric_modes
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.runs.verification.thin_walls import ISOTROPIC
+from bubblefit.runs.verification.thin_walls import sphere_model as sphere
 from bubblefit.solvers.base import DifferentiatingSolver, parameters_of
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -289,3 +291,15 @@ def test_derivatives_of_the_straight_strips(direction, thickness_change):
 )
 def test_derivatives_of_the_bias_strip(law, names, move):
     check_derivatives(bias_strip_of(8, across=4, along=12), law, names, move)
+
+
+def test_slopes_by_all_moduli_equal_those_by_pressure():
+    slope = MembraneSolver(1e-11).run_with_sensitivity(sphere(2, [0.01]), ISOTROPIC)[1][-1]
+    up, down = (
+        MembraneSolver(1e-11).run(sphere(2, [p]), ISOTROPIC).displacement[-1]
+        for p in (0.01001, 0.00999)
+    )
+    by_pressure = (up - down) / 2e-3
+    assert slope @ ISOTROPIC.beta == pytest.approx(
+        -by_pressure, abs=2e-3 * np.abs(by_pressure).max()
+    )
