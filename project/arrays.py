@@ -316,6 +316,20 @@ def _columns_of_curves(curves: Sequence[LoadCurve]) -> Columns:
 # Biaxial tests ----------------------------------------------------------------------------------
 
 
+def _tables_by_ratio(paths: Mapping[str, Any] | Table) -> Mapping[str, Any]:
+    """Return tables by load ratio, "" where one table has all; refuse ratios that are no text."""
+    if is_table(paths):
+        return {"": paths}
+    if not isinstance(paths, Mapping):
+        problem = f"expected arrays by ratio, or a table, got {type(paths).__name__}"
+        raise InputError(None, "paths", problem)
+    for ratio in paths:
+        if not (isinstance(ratio, str) and ratio):
+            problem = f"expected load ratios warp:fill as text, such as '2:1', got {ratio!r}"
+            raise InputError(None, "paths", problem)
+    return paths
+
+
 def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialTable, ...]:
     """Return the records of a biaxial test from arrays or a DataFrame.
 
@@ -331,22 +345,16 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
     InputError
         A table has other columns, a number that is not finite, or a ratio that is no text.
     """
-    tables = {"": paths} if is_table(paths) else paths
-    if not isinstance(tables, Mapping):
-        problem = f"expected arrays by ratio, or a table, got {type(paths).__name__}"
-        raise InputError(None, "paths", problem)
+    tables = _tables_by_ratio(paths)
     records = []
+    columns = {name.replace("_", " "): name for name in BIAXIAL_COLUMNS}
+    units = {name: "N/mm" if name.endswith("load") else "mm/mm" for name in columns}
     for k, (ratio, table) in enumerate(tables.items(), start=1):
-        if not isinstance(ratio, str) or not (ratio or is_table(paths)):
-            problem = f"expected load ratios warp:fill as text, such as '2:1', got {ratio!r}"
-            raise InputError(None, "paths", problem)
         argument = f"paths[{ratio!r}]" if ratio else "paths"
         values = _columns(argument, table, BIAXIAL_COLUMNS).T
         ratios = (ratio,) * len(values) if ratio else None
         if ratios is None and "ratio" in table.columns:
             ratios = tuple(map(str, table["ratio"]))
-        columns = {name.replace("_", " "): name for name in BIAXIAL_COLUMNS}
-        units = {name: "N/mm" if name.endswith("load") else "mm/mm" for name in columns}
         records.append(
             BiaxialTable(
                 path=None,

@@ -4,7 +4,7 @@ A project that was made from objects has files for arrays and cards in memory, t
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import field, replace
 from pathlib import Path
@@ -236,14 +236,7 @@ class TestsOfFile:
             sections = self.file.tests(kind.name)
             for number, name in enumerate(_names(kind.name, sections)):
                 place = self._place(kind.name, number, name)
-                if name in tests:
-                    problem = f"{name!r} is there twice; give one of them another name"
-                    raise place.error("name", problem)
-                prefix = _prefix_of_files(name)
-                for other in tests:
-                    if _prefix_of_files(other) == prefix:
-                        problem = f"files of this test and of {other!r} would begin alike"
-                        raise place.error("name", f"{problem}, {prefix!r}; give it another name")
+                _check_name(name, tests, place)
                 with self.problems.collected():
                     tests[name] = self._read_test(kind, sections[number], place, name, number)
         by_name = {name: read_test.test for name, read_test in tests.items()}
@@ -297,9 +290,16 @@ class TestsOfFile:
         return ReadTest(test, section, as_run, definition)
 
 
-def _prefix_of_files(test: str) -> str:
-    """Return how the names of a test's files begin, by the test's name."""
-    return Output.of(Path(), test, several=True).prefix
+def _check_name(name: str, tests: Iterable[str], place: Place) -> None:
+    """Refuse the name of a test that another has, or whose files would have the same names."""
+    prefixes = {Output.of(Path(), test, several=True).prefix: test for test in tests}
+    prefix = Output.of(Path(), name, several=True).prefix
+    other = prefixes.get(prefix)
+    if other == name:
+        raise place.error("name", f"{name!r} is there twice; give one of them another name")
+    if other is not None:
+        problem = f"files of this test and of {other!r} would begin alike, {prefix!r}"
+        raise place.error("name", f"{problem}; give it another name")
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:

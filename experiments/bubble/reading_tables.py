@@ -143,16 +143,7 @@ def _profiles(
     tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
     if not tables:
         return []
-    for column in ("pressure", "axis"):
-        if len({column in table for table in tables}) > 1:
-            problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
-            raise place.error("data.profiles.files", f"{problem} or in none")
-    if "pressure" not in tables[0]:
-        if pressures is None or len(pressures) != len(tables):
-            problem = f"expected one for each of {len(tables)} tables without such a column"
-            raise place.error("pressures", problem)
-        tables = [t.assign(pressure=p) for t, p in zip(tables, pressures, strict=True)]
-    points = pd.concat(tables)
+    points = pd.concat(_with_pressures(tables, place, pressures))
     points = points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
     if "axis" not in points:
         points = points.assign(axis=str(section.direction_deg))
@@ -165,6 +156,22 @@ def _profiles(
         heights = _series("height", f"heights along {axis}", table, "height", positions)
         series.append(replace(heights, moves_with_sheet=section.moves_with_sheet))
     return series
+
+
+def _with_pressures(
+    tables: Sequence[pd.DataFrame], place: Place, pressures: Sequence[float] | None
+) -> Sequence[pd.DataFrame]:
+    """Return tables of profiles with a column of pressures (MPa), one a table if they have none."""
+    for column in ("pressure", "axis"):
+        if len({column in table for table in tables}) > 1:
+            problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
+            raise place.error("data.profiles.files", f"{problem} or in none")
+    if "pressure" in tables[0]:
+        return tables
+    if pressures is None or len(pressures) != len(tables):
+        problem = f"expected one for each of {len(tables)} tables without such a column"
+        raise place.error("pressures", problem)
+    return [table.assign(pressure=p) for table, p in zip(tables, pressures, strict=True)]
 
 
 def _direction_of_line(name: str, place: Place) -> float:

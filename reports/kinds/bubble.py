@@ -883,13 +883,20 @@ def simulate(
         parts += [*heading, cuts, Table("Apex", ["pressure, kPa", "height, mm"], rows)]
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
-    if replace(test.sheet, tension=(0.0, 0.0)) != SheetSettings():
-        assumption = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
-        if any(test.sheet.tension):
-            assumption = "a flat sheet with a fixed rim; of [bubble.sheet] only tension is used"
-        lines.append(f"note: simulated from {assumption}")
+    lines += _words_on_sheet(test.sheet)
     top_numbers = numbers[next(iter(cards))] if len(cards) == 1 else {}
     return Simulation({**top_numbers, "cards": numbers}, lines, parts=parts)
+
+
+def _words_on_sheet(sheet: SheetSettings) -> list[str]:
+    """Return a line on what a forward analysis leaves out of the settings of the sheet, if any."""
+    if replace(sheet, tension=(0.0, 0.0)) == SheetSettings():
+        return []
+    if any(sheet.tension):
+        assumption = "a flat sheet with a fixed rim; of [bubble.sheet] only tension is used"
+    else:
+        assumption = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
+    return [f"note: simulated from {assumption}"]
 
 
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
