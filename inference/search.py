@@ -75,20 +75,25 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
             point = problem.evaluate(y, False, warm=False)
             if point is not None and point.stable:
                 return y
-        if tried >= MAX_ANALYSES and not unknowns.size:
-            raise NoFeasibleStart(
-                f"start {number}: the deck failed with all of {tried} random parameters, at last: "
-                f"{problem.failure}; narrow their bounds"
-            )
         if tried >= MAX_ANALYSES:
-            raise NoFeasibleStart(
-                f"start {number}: the analysis failed, or the work of a closed path is above its "
-                f"bound, at all of {tried} random points with positive moduli; raise the lower "
-                "bounds or law.closed_path, or add increments"
-            )
+            raise _without_analysis(problem, number, tried)
     raise NoFeasibleStart(
         f"start {number}: none of {MAX_DRAWS} random points inside the bounds has positive "
         "moduli over the strain range; check the bounds and the strain range"
+    )
+
+
+def _without_analysis(problem: FitProblem, number: int, tried: int) -> NoFeasibleStart:
+    """Return the error of a start whose analyses have all failed."""
+    if not problem.unknowns.size:
+        return NoFeasibleStart(
+            f"start {number}: the deck failed with all of {tried} random parameters, at last: "
+            f"{problem.failure}; narrow their bounds"
+        )
+    return NoFeasibleStart(
+        f"start {number}: the analysis failed, or the work of a closed path is above its "
+        f"bound, at all of {tried} random points with positive moduli; raise the lower "
+        "bounds or law.closed_path, or add increments"
     )
 
 
