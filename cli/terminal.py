@@ -447,7 +447,7 @@ def _louder(ctx: click.Context, _: click.Parameter, verbose: bool) -> None:
 def with_common_options(command: click.Command) -> click.Command:
     """Add --verbose and --events to a command, or to each command of a group.
 
-    Both are eager callbacks; the command's function does not receive them.
+    Both work by callbacks; the command's function does not receive them.
     """
     if isinstance(command, click.Group):
         for subcommand in command.commands.values():

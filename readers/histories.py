@@ -38,10 +38,11 @@ class LoadHistory:
     path : Path
         File that the history was read from.
     load : (n,) array
-        Load, in N from `read_history`.
+        Load, N; a pressure or a load per width where only its pace is asked for.
     strain : (n,) array
-        Strain (0.01 is 1 %).
+        Engineering strain (0.01 is 1 %).
     time : (n,) array, s, or None
+        Never falls.
     travel : (n,) array, mm, or None
         Travel of the machine's crosshead.
     measured : {"extensometer", "grips"}

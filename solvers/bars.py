@@ -93,10 +93,12 @@ def strip_stresses(solver: Solver) -> tuple[float, ...]:
 def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> History:
     """Return the history of a strip along a yarn that is strained alike everywhere.
 
+    It serves solvers that know a strip as one state of strain only.
+
     Parameters
     ----------
     strain : (n, 3) array
-        Log strain.
+        Log strain along warp and fill, and shear, which is not used; a row for each increment.
     force : (n,) array, N
         Of the whole strip.
     """

@@ -71,7 +71,7 @@ def run_folder(
     solver : str
         Name of the solver, for messages.
     logs : str
-        Name or pattern, in the folder, of the files whose tail a failure carries.
+        Name, in the folder, of the log whose tail a failure carries.
 
     Raises
     ------

@@ -415,7 +415,7 @@ class FabricCurves:
     Attributes
     ----------
     warp, fill, shear : (n, 2) arrays
-    largest_yarn_stress : float, MPa
+    largest_yarn_stress : float, in the card's unit of stress
         Largest stress along a yarn in shear.
     biaxial_strain : float
         Log strain of both yarns at which `missed_shares` are stated.
@@ -494,7 +494,7 @@ FROM_TOP = (
 def unloading_curves(
     card: MaterialCard, options: ExportTableOptions, measure: Measure
 ) -> dict[str, Array]:
-    """Return unloading curves (n, 2), strain and stress in MPa, of warp, fill and shear.
+    """Return unloading curves (n, 2) of warp, fill and shear: strain and the card's unit of stress.
 
     They begin at the end of the range, to which the fabric was loaded for the first time, and are
     listed upwards from the permanent set. Empty where the law has no memory.
@@ -578,7 +578,10 @@ def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
 
 
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
-    """Return rows of a modulus in tension: direction, strain, modulus and nominal stress."""
+    """Return rows of `CSV_COLUMNS` of a modulus in tension.
+
+    They are the direction, log strain, modulus, and the nominal strain and stress of a test.
+    """
     is_tension = table.strain >= 0
     strain = table.strain[is_tension]
     modulus = table.modulus[is_tension]

@@ -239,9 +239,16 @@ def _sheet_stress(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
+    law : CompiledLaw
     green : CauchyGreen
         Its Cauchy-Green tensor.
+    before, after
+        States of all Gauss points, [quad, point], at the start and the end; `after` is written.
+    wrinkling : Wrinkling or None
+        Its strain is written.
     work : WrinkleWork
+    response : PointResponse
+        Written.
     """
     old = PointState(before.strain[e, g], before.stress[e, g])
     new = PointState(after.strain[e, g], after.stress[e, g])

@@ -142,7 +142,10 @@ class NewtonIteration:
         return self.idle >= self.settings.max_idle
 
     def _is_worse(self, norm: float) -> bool:
-        """Return whether the last step has to be shortened."""
+        """Count fruitless steps, and return whether the last step has to be shortened.
+
+        Called once an iteration, as it keeps the smallest norm of the residual.
+        """
         settings = self.settings
         gains_little = norm > 0.5 * self.smallest_norm
         self.fruitless = self.fruitless + 1 if self.has_jumps and gains_little else 0
