@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError, SolverFailure, check_one_of
-from ..runs.verification import SUBJECTS
 from ..solvers.registry import command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
 from .options import AS_JSON, OVERWRITE, out_option, reserved_folder, with_options
@@ -280,13 +279,23 @@ def _side_by_side(left: Path, right: Path) -> tuple[Path, Report, Path]:
 COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9}  source"
 
 
+class SubjectOption(click.Option):
+    """The option --subject, whose help names the subjects."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from ..runs.verification import SUBJECTS
+
+        self.help = f"One of: {', '.join(SUBJECTS)}.  [all]"
+        return super().get_help_record(ctx)
+
+
 @command("verify", "bubblefit verify", "bubblefit verify --subject bars --subject hencky")
 @click.option(
     "--subject",
     "subjects",
     multiple=True,
     metavar="NAME",
-    help=f"One of: {', '.join(SUBJECTS)}.  [all]",
+    cls=SubjectOption,
 )
 @click.option(
     "--data",

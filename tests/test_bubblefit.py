@@ -138,7 +138,7 @@ KNOWN = "examples/bubble-known-solution/project.toml"
         ("import bubblefit.cli.fits, bubblefit.cli.predict, bubblefit.cli.studies",
          {*FIRST_USED, "bubblefit.experiments.base", "bubblefit.project"}),
         ("import bubblefit.cli.tools",
-         {*FIRST_USED, "bubblefit.reports", "bubblefit.solvers.membrane.solver"}),
+         {*FIRST_USED, "bubblefit.reports", "bubblefit.experiments", "bubblefit.project"}),
         ("import bubblefit as b; from bubblefit.runs.check import check_trusted;"
          f" check_trusted(b.read_project(b.__path__[0] + '/{KNOWN}'))",
          {"bubblefit.experiments.strips", "bubblefit.experiments.cylinder"}),
