@@ -273,10 +273,11 @@ def mean_ratio(
 def _atanh_ratio(z: float) -> tuple[float, float]:
     """Return f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
     if z < 0.01:
-        f = 1 / 9 + z * (1 / 11 + z * (1 / 13 + z * (1 / 15)))
-        f = 1.0 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * f)))
-        slope = 4 / 9 + z * (5 / 11 + z * (6 / 13 + z * (7 / 15)))
-        return f, 1 / 3 + z * (2 / 5 + z * (3 / 7 + z * slope))
+        f = 1.0 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z / 13)))))
+        slope = 1 / 3 + z * (
+            2 / 5 + z * (3 / 7 + z * (4 / 9 + z * (5 / 11 + z * (6 / 13 + z * 7 / 15))))
+        )
+        return f + z**7 / 15, slope
     s = math.sqrt(z)
     f = math.atanh(s) / s
     return f, (1.0 / (1.0 - z) - f) / (2.0 * z)
@@ -297,20 +298,17 @@ def log_strain(green: CauchyGreen, h: Array, p: Array) -> bool:
     # Below 1e-20 the powers of m in the derivatives underflow.
     if not (m > 1e-20 and det > 1e-9 * m * m):
         return False
-    inv_m = 1.0 / m
-    inv_det = 1.0 / det
-    inv_square = inv_m * inv_m
-    f, f1 = _atanh_ratio(r * inv_square)
-    b = f * inv_m
-    b_r = f1 * inv_m * inv_square
-    b_m = -(f + 2.0 * r * f1 * inv_square) * inv_square
+    f, f1 = _atanh_ratio(r / (m * m))
+    b = f / m
+    b_r = f1 / m**3
+    b_m = -f / m**2 - 2.0 * r * f1 / m**4
     a = 0.5 * math.log(det)
     h[0] = 0.5 * (a + b * q)
     h[1] = 0.5 * (a - b * q)
     h[2] = b * c
-    a_m = m * inv_det
-    a_q = -q * inv_det
-    a_c = -c * inv_det
+    a_m = m / det
+    a_q = -q / det
+    a_c = -c / det
     b_q = 2.0 * q * b_r
     b_c = 2.0 * c * b_r
     u_m = b_m * q
@@ -348,8 +346,6 @@ def pull_back(
     j = math.sqrt(m * m - q * q - c * c)
     root = math.sqrt(2.0 * (m + j))
     k = 1.0 / (root * j)
-    inv_j = k * root
-    inv_trace = k * k * j * j  # 1 / (tr C + 2 J)
     a = m - q + j
     b = m + q + j
     w1 = k * a
@@ -370,8 +366,8 @@ def pull_back(
         dm = 0.0 if i == 2 else 1.0
         dq = 1.0 if i == 0 else (-1.0 if i == 1 else 0.0)
         dc = 1.0 if i == 2 else 0.0
-        dj = (m * dm - q * dq - c * dc) * inv_j
-        dk = -k * ((dm + dj) * inv_trace + dj * inv_j)
+        dj = (m * dm - q * dq - c * dc) / j
+        dk = -k * ((dm + dj) / (root * root) + dj / j)
         d1 = k * (dm - dq + dj) + a * dk
         d2 = k * (dm + dq + dj) + b * dk
         d3 = -k * dc - c * dk
@@ -715,8 +711,7 @@ def _integrate(
     if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
         return False
     nu = coupling[0]
-    inv_warp = 1.0 / warp
-    nu_nu = nu * nu * fill * inv_warp
+    nu_nu = nu * nu * fill / warp
     den = 1.0 - nu_nu
     if not den > 1e-3:
         return False
@@ -725,8 +720,8 @@ def _integrate(
     d22 = fill * inv
     d12 = nu * d22
     inv2 = inv * inv
-    den_warp = nu_nu * inv_warp
-    den_fill = -nu * nu * inv_warp
+    den_warp = nu_nu / warp
+    den_fill = -nu * nu / warp
     d11_e1 = inv - warp * den_warp * inv2
     d11_e2 = -warp * den_fill * inv2
     d22_e1 = -fill * den_warp * inv2
@@ -765,7 +760,7 @@ def _integrate(
     slopes[BEFORE1] = warp_before
     slopes[BEFORE2] = fill_before
     slopes[BEFORE3] = shear_before
-    den_nu = 2.0 * nu * fill * inv_warp * inv2
+    den_nu = 2.0 * nu * fill / warp * inv2
     slopes[D11_NU] = warp * den_nu
     slopes[D22_NU] = fill * den_nu
     return True
