@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..experiments.forward import by_strain
 from ..inference.descent import DescentSettings, descend
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
-from ..inference.reported import LEVEL, ReportedModulus, moduli_of, sigma_words
+from ..inference.reported import LARGEST_SIGMA, LEVEL, ReportedModulus, moduli_of, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
@@ -163,12 +163,18 @@ class Bootstrap(Presented):
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
-        """Return the relative 1 sigma of samples and fit by label, an RMS along the strain."""
-        moduli = self.optimum.certainty.moduli
-        return {
-            label: (np.sqrt(np.mean(self.spread[name] ** 2)), moduli[name].rms_sigma)
-            for name, label in modulus_labels(self.optimum.best.law.form).items()
-        }
+        """Return the relative 1 sigma of samples and fit by label, an RMS along the strain.
+
+        That of samples is NaN where the data do not determine the modulus: refits then stay where
+        they begin, which says nothing of other specimens.
+        """
+        sigmas = {}
+        for name, label in modulus_labels(self.optimum.best.law.form).items():
+            of_fit = self.optimum.certainty.moduli[name].rms_sigma
+            is_determined = of_fit < LARGEST_SIGMA
+            of_samples = np.sqrt(np.mean(self.spread[name] ** 2)) if is_determined else np.nan
+            sigmas[label] = (float(of_samples), of_fit)
+        return sigmas
 
     def coefficients(self) -> pd.DataFrame:
         """Return the scatter of the unknowns over the samples, and their correlations.

@@ -288,6 +288,9 @@ def audit_bootstrap(folder, ledger):
         if outside.any():
             ledger.find(f"bootstrap.csv: {name}", "the median is outside the percentiles")
         spread = float(np.sqrt(np.mean(own["sigma_relative"] ** 2)))
+        of_fit = result["sigma_relative_of_fit"][name]
+        if of_fit is None or of_fit >= 1:
+            spread = None  # the data do not determine the modulus
         ledger.json(("sigma_relative", name), spread, abs=1e-12)
         _sigma_of_fit(folder, ledger, name, fit, card)
         ledger.claim_json(("up_to_strain", DIRECTION[name]), "consistent")
@@ -491,7 +494,7 @@ def _after_the_first(ledger, result):
 
 
 def _known(sigma):
-    return percent(sigma) if sigma < 1.0 else "unknown"
+    return percent(sigma) if sigma is not None and sigma < 1.0 else "unknown"
 
 
 def _plan_row(ledger, at, row):
