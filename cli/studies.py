@@ -169,6 +169,8 @@ def profile_command(
     strains_of: dict[str, list[float]] = {}
     for text in moduli:
         name, equals, strains = text.partition("=")
+        if name in strains_of and not (usual_strains or (equals and strains_of[name])):
+            raise InputError(None, "--modulus", f"{name} is given twice, once without strains")
         chosen_strains = common.numbers(strains, "--modulus") if equals else usual_strains
         strains_of.setdefault(name, []).extend(chosen_strains)
     progress = common.LiveLine("sides", common.quiet(options))
@@ -353,6 +355,7 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     forms = options["forms"]
     cards = options["cards"]
     _check_exclusive(path, {"--card": cards, "--leave": leave, "--weights": counted})
+    _check_exclusive(path, {"--form": forms, "--card": cards})
     if counted is not None:
         _check_exclusive(path, {"--form": forms, "--weights": counted})
         starts = weight_study.STARTS

@@ -457,7 +457,7 @@ class LawComparison(Presented):
             form.fit.verdict.state if objections else "usable",
             f"{form.name} is the simplest form that predicts what was left out as well as the best",
             objections,
-            next_step=f'write form = "{form.name}" into [law] and fit again',
+            next_step=f"write {_keys_of_form(form.name)} into [law] and fit again",
         )
 
     @property
@@ -602,6 +602,12 @@ def compare(
         )
         fits.append(FormFit(form, best_fit, fold_errors, compared))
     return finished(LawComparison(tuple(fits), fold_starts), out)
+
+
+def _keys_of_form(name: str) -> str:
+    """Return the keys of [law] for a form by its name in a comparison, such as spline:6."""
+    form, _, knots = name.partition(":")
+    return f'form = "{form}"' + (f" and knots = {knots}" if knots else "")
 
 
 def _coarse_to_fine(setup: FitSetup) -> Project:

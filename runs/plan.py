@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -379,7 +380,7 @@ def plan(
 def _check_noise(noise: Mapping[str, float], plannable: Mapping[str, Plannable]) -> None:
     """Raise InputError for a noise that is not positive, or of a kind that cannot be planned."""
     for name, value in noise.items():
-        if name not in plannable or not value > 0:
+        if name not in plannable or not 0 < value < math.inf:
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(plannable)}"
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
 
@@ -388,9 +389,9 @@ def _ends(card: MaterialCard, optimum: CardOptimum, strain: Sequence[float] | No
     """Return the largest strains (3,) of the moduli: the user's, or the card's valid range."""
     if strain is not None:
         ends = np.array(strain, dtype=float)
-        if ends.shape != (3,) or not (ends > 0).all():
-            problem = f"expected three strains above 0 (warp, fill, shear), got {strain}"
-            raise InputError(None, "--strain", problem)
+        if ends.shape != (3,) or not ((ends > 0) & (ends < 2)).all():
+            problem = "expected three strains between 0 and 2 (warp, fill, shear), 0.05 for 5 %"
+            raise InputError(None, "--strain", f"{problem}; got {strain}")
         return ends
     valid = card.law.strain_range
     limited = np.minimum(valid, optimum.best.law.strain_range)

@@ -162,7 +162,8 @@ class Validation(Presented):
             step = "see in the table why there are no predictions"
             return Verdict("not to be used", "nothing was predicted by all laws", next_step=step)
         best = min(means, key=means.__getitem__)
-        words = f"what was left out is predicted with an error of {100 * means[best]:.3g} %"
+        subject = "what was left out is predicted" if self.leave else "the tests are met"
+        words = f"{subject} with an error of {100 * means[best]:.3g} %"
         errors = {best: means[best]}
         return Verdict(
             state_of_predictions(errors, failed),
@@ -179,7 +180,7 @@ class Validation(Presented):
             "command": "validate",
             "title": self.project.title,
             "version": __version__,
-            "left_out": self.leave,
+            "left_out": self.leave or None,
             "error": "mean relative RMS error of a test, or of its part",
             "mean_foretold": self.means,
             "analyses": self.analyses,
@@ -412,6 +413,9 @@ def validate(
         As in `fit`; InputError also if there are fewer than two tests or parts.
     """
     if cards:
+        if forms or leave != TESTS:
+            problem = "goes with neither --form nor --leave: nothing is fitted"
+            raise InputError(project.path, "--card", problem)
         check_unused(out, False, overwrite)
         return finished(judge_cards(project, chosen_cards(project, cards), tests), out)
     output = OutputSettings.of(out, resume, overwrite, command_line)
@@ -585,7 +589,7 @@ def judge_cards(
         ]
     if predicted:
         judged += _judge_predictions(predict(project, predicted, cards, samples=0))
-    return Validation(project, tuple(judged))
+    return Validation(project, tuple(judged), leave="")
 
 
 def _judge_predictions(predictions: Predictions) -> list[Judged]:

@@ -262,7 +262,7 @@ def weights(
     output = OutputSettings.of(out, resume, overwrite, command_line)
     on_event = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
-    chosen = project.chosen(tests, fitted=True)
+    chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
     names = [test.name for test in chosen if counted in (test.kind, test.name)]
     if not names or len(names) == len(chosen):
         options = ", ".join(dict.fromkeys(name for t in chosen for name in (t.kind, t.name)))

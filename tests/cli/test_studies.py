@@ -58,6 +58,22 @@ def test_study_of_mesh_of_a_bubble_converges(bubble, drawn, golden):
     assert "--overwrite" in study(*run, cwd=bubble, code=2)
 
 
+@pytest.mark.parametrize(
+    ("run", "words"),
+    [
+        (("plan", "--strain", "inf,1,1"), "strains between 0 and 2"),
+        (("plan", "--strain", "5,5,5"), "0.05 for 5 %"),
+        (("plan", "--noise", "strips=inf"), "expected KIND=VALUE above 0"),
+        (("profile", "--modulus", "G12", "--modulus", "G12=0.02"), "once without strains"),
+        (("validate", "--form", "linear"), "--form, --card: give one of them"),
+    ],
+)
+def test_option_that_would_be_ignored_or_is_impossible_is_refused(bubble, run, words):
+    name, *options = run
+    command = (name, "project.toml", "--card", "card.toml", *options, "--out", "out")
+    one_line(in_process(*command, cwd=bubble, code=2), words)
+
+
 def test_study_of_nu12_of_a_bubble_prints_its_table(bubble, golden):
     golden("study-nu12", study("nu12", "--out", "out", cwd=bubble), bubble)
 

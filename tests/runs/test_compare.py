@@ -308,3 +308,11 @@ def test_starts_of_forms_run_coarse_to_fine(
     setup = SimpleNamespace(project=project.with_fit(starts=starts, coarse_to_fine=setting))
     monkeypatch.setattr(study, "coarse_problem", lambda _: has_coarse or None)
     assert study._coarse_to_fine(setup).fit.coarse_to_fine is expected
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [("spline:6", 'form = "spline" and knots = 6'), ("linear", 'form = "linear"')],
+)
+def test_next_step_names_keys_that_a_project_has(name, keys):
+    assert study._keys_of_form(name) == keys

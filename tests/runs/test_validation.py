@@ -190,6 +190,10 @@ def test_card_is_judged_without_a_fit(project, tmp_path):
     assert f" {rms:.4g} " in done.output
     again = in_process(*command, cwd=tmp_path, code=2)
     assert "--overwrite" in again.output + again.stderr
+    assert "the tests are met with an error of" in done.output and "left out" not in done.output
+    assert json.loads((tmp_path / "judged" / "result.json").read_text())["left_out"] is None
+    with pytest.raises(InputError, match="neither --form nor --leave"):
+        validation.validate(project, forms=["linear"], cards={"made": MaterialCard(LAW, 0.8, "a")})
     thick = MaterialCard(LAW, 1.0, "thick")
     with pytest.raises(InputError, match=r"fabric\.thickness: thick: .* 1 mm"):
         validation.judge_cards(project, {"thick": thick})

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.project.project import read_project
 from bubblefit.runs import weight_study as study_of
 from bubblefit.runs.result import Fit
 from bubblefit.runs.weight_study import COUNTS, weights
@@ -78,3 +79,10 @@ def test_interrupted_study_of_weights_is_resumed(project, tmp_path, monkeypatch)
     assert all(run.analyses < 20 for run in study.runs)  # from the optimum beside it
     with pytest.raises(InputError, match=r"run\.json: parts: .*another counted"):
         weights(project, "one", **given, resume=True)
+
+
+def test_weight_of_a_test_that_is_only_predicted_cannot_be_studied(tmp_path):
+    zero = constant_strips(tmp_path, ("weight = 3.0", "weight = 0"))
+    for counted in ("one", "two"):
+        with pytest.raises(InputError, match="--weights"):
+            weights(read_project(zero), counted, starts=1)
