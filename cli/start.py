@@ -184,7 +184,7 @@ def _check_options(
         names = ", ".join(name for name, is_chosen in chosen.items() if is_chosen)
         raise InputError(None, names, "give one of them, not both")
     if settings and not is_own:
-        option = next(iter(settings))
+        option = next(iter(settings)).replace("_", "-")
         raise InputError(None, f"--{option}", "means nothing without --own")
 
 

@@ -201,12 +201,10 @@ def _place_in(name: str) -> list[float] | None:
     plain, _ = split_unit(name)
     numbers = [parse_number(n) for n in re.findall(NUMBER, plain)]
     words = {word.casefold() for word in WORD.findall(plain)}
-    if len(numbers) == 2:
-        return numbers
-    for axis, direction_words in enumerate(DIRECTION_WORDS.values()):
-        if len(numbers) == 1 and words & direction_words:
-            return [0.0, numbers[0]] if axis else [numbers[0], 0.0]
-    return None
+    axes = [axis for axis, known in enumerate(DIRECTION_WORDS.values()) if words & known]
+    if len(axes) == 1 and numbers:  # a number before is that of the gauge
+        return [0.0, numbers[-1]] if axes[0] else [numbers[-1], 0.0]
+    return numbers if len(numbers) == 2 else None
 
 
 def read_profiles(file: Path) -> GaugedBubble:
@@ -398,10 +396,11 @@ def _gauge_bubbles(groups: Sequence[FileGroup]) -> list[Settings]:
 def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     """Return the values of one test of all strips; none where no direction is known."""
     files: dict[str, list[str]] = {}
-    in_heads: dict[str, float] = {}
+    sizes_in_heads: dict[str, set[float]] = {}
     by_angle = False
     for group in groups:
-        in_heads |= _sizes_in_head(group.files[0])
+        for size, value in _sizes_in_head(group.files[0]).items():
+            sizes_in_heads.setdefault(size, set()).add(value)
         is_word = len(group.content) > 1 or _direction_word(group.files[0]).isalpha()
         for direction, names in _files_by_direction(group).items():
             files.setdefault(direction, []).extend(names)
@@ -409,6 +408,8 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     unknown = files.pop("", [])
     if not files:
         return []
+    # A size that differs between strips stays open: one number would be wrong for some of them.
+    in_heads = {size: min(values) for size, values in sizes_in_heads.items() if len(values) == 1}
     values: Settings = {"kind": "strips", "unknown": unknown, "in_heads": in_heads}
     values |= {"by_angle": by_angle, **strips_by_direction(files)}
     sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in values["cuts"])]

@@ -121,11 +121,11 @@ def direction_named(name: str | float, path: Path | None = None, field: str = "d
     words = name if isinstance(name, str) else f"{name:g} deg"
     plain = re.sub(r"[\W_]+", "", words.casefold())
     angle = re.fullmatch(r"\s*(\d+\.?\d*)[\s_]*(?:deg|degrees?|°)\s*", words.casefold())
-    if plain in DIRECTION_ALIASES:
-        return DIRECTION_ALIASES[plain]
     if angle and float(angle[1]) <= 90:
         degrees = float(angle[1])
         return DIRECTION_OF_ANGLE.get(degrees, f"{degrees:g} degrees")
+    if plain in DIRECTION_ALIASES:
+        return DIRECTION_ALIASES[plain]
     aliases = ", ".join(DIRECTION_ALIASES)
     problem = f"unknown direction {words[:40]!r}; use one of {aliases}, 0 to 90 deg (from the warp)"
     raise InputError(path, field, problem)

@@ -73,6 +73,8 @@ class Frame:
         Numbers of the points in the file.
     number : float or None
         Number of the frame in a file of several.
+    rows : (m,) array of int or None
+        Row of each point, from 0; None where it is not known.
     """
 
     points: Array
@@ -83,6 +85,7 @@ class Frame:
     source: FrameSource = field(default_factory=FrameSource)
     ids: Array | None = None
     number: float | None = None
+    rows: NDArray[np.intp] | None = None
 
     def __post_init__(self) -> None:
         if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
@@ -204,18 +207,21 @@ def _displaced_from(
 def _displaced(frame: Frame, reference: Frame) -> Frame:
     """Return a frame of positions with its displacements from a reference frame.
 
-    Points are paired by their numbers, or row by row where either frame has none.
+    Points are paired by their numbers, or by their rows in the files where either frame has none.
     """
     if np.isfinite(frame.displacement).any():
         problem = "holds displacements, and a reference is for files of places alone; leave it out"
         raise InputError(frame.path, "", problem)
-    rows = np.arange(len(frame.points))
-    reference_rows = np.arange(len(reference.points))
-    if frame.ids is not None and reference.ids is not None:
-        _, rows, reference_rows = np.intersect1d(frame.ids, reference.ids, return_indices=True)
-    if len(rows) != len(reference_rows) or not len(rows):
+    counts = [len(f.points) + sum(f.dropped.values()) for f in (frame, reference)]
+    numbers = [frame.ids, reference.ids]
+    if frame.ids is None or reference.ids is None:
+        numbers = [frame.rows, reference.rows] if counts[0] == counts[1] else [None, None]
+    rows = reference_rows = np.zeros(0, dtype=np.intp)
+    if numbers[0] is not None and numbers[1] is not None:
+        _, rows, reference_rows = np.intersect1d(*numbers, return_indices=True)
+    if not len(rows):
         problem = (
-            f"holds {len(rows)} points, the reference {len(reference_rows)}, and no column of point"
+            f"holds {counts[0]} points, the reference {counts[1]}, and no column of point"
             " numbers (id) in both says which are the same; export one, or all points of every"
             " frame"
         )
@@ -227,6 +233,7 @@ def _displaced(frame: Frame, reference: Frame) -> Frame:
         displacement=frame.points[rows] - points,
         sigma=None if frame.sigma is None else frame.sigma[rows],
         ids=None,
+        rows=None,
     )
 
 
@@ -273,6 +280,8 @@ class FrameRows:
         Measure of error, below zero where correlation was lost.
     camera_axes : bool
         Whether y points down and z away from the camera.
+    row_numbers : (rows,) array of int or None
+        Row of each in its file, from 0, where the reader left rows out.
     dropped, notes, ids, number
         Fields of the same names of `Frame` and of its source.
     """
@@ -287,6 +296,7 @@ class FrameRows:
     notes: tuple[str, ...] = ()
     ids: Array | None = None
     number: float | None = None
+    row_numbers: NDArray[np.intp] | None = None
 
 
 def frame_of(
@@ -334,7 +344,15 @@ def frame_of(
         source=FrameSource(format, dict(rows.names), units, notes),
         ids=None if rows.ids is None else rows.ids[good],
         number=rows.number,
+        rows=_row_numbers(rows, good),
     )
+
+
+def _row_numbers(rows: FrameRows, good: NDArray[np.bool_]) -> NDArray[np.intp] | None:
+    """Return the rows in the file of good rows; None where the reader left some out unnumbered."""
+    if rows.row_numbers is not None:
+        return rows.row_numbers[good]
+    return None if any(rows.dropped.values()) else np.flatnonzero(good)
 
 
 def _describe_missing(missing: Sequence[str], rows: FrameRows) -> str:

@@ -226,7 +226,7 @@ def choose_frames(
     frames: list[int] = []
     for number, branch in enumerate(branches):
         rising = branch[np.argsort(pressures[branch], kind="stable")]
-        if requested is not None:
+        if requested is not None and len(rising):
             frames += _nearest(pressures, rising, requested, tolerance)
             continue
         distinct = _distinct(pressures, rising, pressures[frames[-1]] if frames else -np.inf)

@@ -228,7 +228,7 @@ class MachineTable:
             stamps = self.table.stamps(column)
             if stamps is not None:
                 return stamps
-            match = re.search(rf"[_\s]({'|'.join(units)})$", column)
+            match = re.search(rf"[_\s/,]({'|'.join(units)})$", column)
             if not unit and match:
                 unit = match[1]
             if not unit and not channel.unit:

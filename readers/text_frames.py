@@ -618,6 +618,7 @@ def read_text_rows(
         dropped={FLAGGED: int((~good).sum()), BELOW_POINTS: layout.summary_count},
         notes=unused_flags(layout, options),
         ids=ids,
+        row_numbers=np.flatnonzero(good),
     )
     return [rows] if frame_numbers is None else split_frames(rows, frame_numbers)
 
@@ -655,6 +656,7 @@ def split_frames(rows: FrameRows, frame_numbers: Array) -> list[FrameRows]:
                 number=float(number),
                 ids=None if rows.ids is None else rows.ids[in_frame],
                 dropped=rows.dropped if number == numbers[0] else {},
+                row_numbers=None,
             )
         )
     return frames

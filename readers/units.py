@@ -93,7 +93,7 @@ _UNIT_NAMES = (
     "|psi|lbf/in|lbf|lbs|lb|kgf|kg|kips|kip|gf|g|ozf|daN|inches|inch|in|ft|mils|mil|µm|μm|um"
 )
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
-_UNIT = r"[A-Za-zµμ°%‰\"″][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"
+_UNIT = r"(?:1/[cm]?m|-|[A-Za-zµμ°%‰\"″][A-Za-z0-9µμ°%‰/^*·²-]{0,6})"
 _PER_WIDTH = re.compile(r"N ?/ ?(50?) ?([cm]m)\b")
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
 _AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_UNIT_NAMES})$")

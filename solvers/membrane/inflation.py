@@ -45,6 +45,7 @@ VOLUME_CONTROL = VolumeControl()
 
 def through_snap(
     membrane: ClosedMembrane,
+    neighbours: Neighbours,
     u: Array,
     previous: float,
     level: float,
@@ -55,6 +56,8 @@ def through_snap(
     Parameters
     ----------
     membrane : ClosedMembrane
+    neighbours : Neighbours
+        They follow each step, as derivatives depend on the strain path.
     u : (n, 3) array, mm
         Equilibrium at the pressure `previous`.
     previous, level : float, MPa
@@ -72,10 +75,12 @@ def through_snap(
     pressure = previous
     step = settings.step
     slope = np.zeros_like(u)
+    membranes = [membrane, *neighbours.membranes]
     try:
         while step >= settings.smallest_step and volume < settings.max_growth * initial_volume:
             constant = (outer_pressure + pressure) * volume * (1.0 + step)
-            membrane.gas = ClosedGas(constant, outer_pressure)
+            for filled in membranes:
+                filled.gas = ClosedGas(constant, outer_pressure)
             displacement = membrane.equilibrium(u + step * slope, 0.0)
             if displacement is None and step < 0.5 * settings.step:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.
@@ -87,8 +92,10 @@ def through_snap(
                 slope = np.zeros_like(u)
                 continue
             if membrane.pressure >= level:
-                membrane.gas = None
+                for filled in membranes:
+                    filled.gas = None
                 return membrane.equilibrium(displacement, level)
+            neighbours.follow(membrane, displacement)
             membrane.accept()
             slope = (displacement - u) / step
             u = displacement
@@ -97,7 +104,8 @@ def through_snap(
             step = min(settings.step, settings.step_growth * step)
         return None
     finally:
-        membrane.gas = None
+        for filled in membranes:
+            filled.gas = None
 
 
 def analyse_inflated(
@@ -144,7 +152,7 @@ def analyse_inflated(
     volume = np.zeros(len(levels))
     wrinkled = np.zeros(len(levels))
     sides = np.ones(len(model.mesh.quads), dtype=bool)
-    filling = Filling(membrane)
+    filling = Filling(membrane, neighbours)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     record = IncrementRecord(membrane, len(levels))
     membrane.keep_tangent = False
@@ -226,7 +234,7 @@ def _released(
 
 
 class Filling(Loading):
-    """Loading of a closed membrane by a pressure (MPa).
+    """Loading of a closed membrane by a pressure (MPa), with neighbours that follow its steps.
 
     Attributes
     ----------
@@ -240,8 +248,9 @@ class Filling(Loading):
     max_volume_growth = 0.1
     smallest_step = 0.02
 
-    def __init__(self, membrane: ClosedMembrane) -> None:
+    def __init__(self, membrane: ClosedMembrane, neighbours: Neighbours) -> None:
         self.membrane = membrane
+        self.neighbours = neighbours
         self.snaps: list[tuple[float, float]] = []
 
     def remarks(self) -> tuple[Note, ...]:
@@ -280,7 +289,7 @@ class Filling(Loading):
         if lower == level:
             return u
         self.snaps.append((lower, level))
-        return through_snap(self.membrane, u, lower, level)
+        return through_snap(self.membrane, self.neighbours, u, lower, level)
 
     def _grows_steadily(self, u: Array, displacement: Array, share: float) -> bool:
         """Return whether the volume grows little between two displacements (nodes, 3) mm.
@@ -319,6 +328,7 @@ class Filling(Loading):
             lower, u = target, displacement
             if lower == level:
                 break
+            self.neighbours.follow(self.membrane, u)
             self.membrane.accept()
             step = 1.5 * step
         return lower, u

@@ -177,6 +177,13 @@ def test_a_spreadsheet_of_pressure_and_apex_height_is_a_balanced_sheet(tmp_path)
     assert 3 * low < 450 < high / 3
 
 
+def test_a_table_of_the_apex_passes_the_check(tmp_path):
+    rows = [f"{p},{1e-4 * h},{2e-3 * h}" for p, h in zip(PRESSURES, APEX, strict=True)]
+    text = "\n".join(["p (kPa),curvature warp (1/mm),strain warp (mm/mm)", *rows])
+    (bubble,) = check_of_tables(tmp_path, {"apex.csv": text}, "--radius", 100)["bubble"]
+    assert bubble["data"]["apex"]["files"] == ["apex.csv"] and "sheet" not in bubble
+
+
 def test_gauges_and_profiles_are_one_bubble(tmp_path):
     rows = [f"{p},{h},{0.76 * h:.2f}" for p, h in zip(PRESSURES, APEX, strict=True)]
     heights = "\n".join(["p (kPa),apex (mm),warp 50 (mm)", *rows])

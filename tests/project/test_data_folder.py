@@ -97,6 +97,7 @@ def table(folder, heading, rows=((10, 9.6, 7.3), (20, 12.1, 9.2), (30, 14.0, 10.
         ("pressure (kPa),apex (mm),warp 50 (mm)", [[0.0, 0.0], [50.0, 0.0]]),
         ("pressure (kPa),fill 50 (mm),z 0/0 (mm)", [[0.0, 50.0], [0.0, 0.0]]),
         ("p (kPa),laser 30;-20 (mm),laser 0;0 (mm)", [[30.0, -20.0], [0.0, 0.0]]),
+        ("p (kPa),Gauge 1 warp 50 (mm),Gauge 2 fill 50 (mm)", [[50.0, 0.0], [0.0, 50.0]]),
     ],
 )
 def test_places_of_gauges_stand_in_their_headings(tmp_path, heading, places):

@@ -8,6 +8,7 @@ from bubblefit.readers.curves import (
     LoadCurve,
     LoadPolynomial,
     cut_of,
+    direction_named,
     fit_load_polynomial,
     in_order,
     read_load_curves,
@@ -209,3 +210,11 @@ def test_specimens_side_by_side_are_named_by_a_pattern(tmp_path):
     assert second.until_largest_load().lateral == pytest.approx([0, -0.01])
     words = complaint(read_load_curves, path, columns={**columns, "load": "F*"}, direction="warp")
     assert "F*" in words
+
+
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [("4.5 deg", "4.5 degrees"), (4.5, "4.5 degrees"), ("45 deg", "bias"), (90, "fill")],
+)
+def test_directions_are_named_by_words_and_angles(name, direction):
+    assert direction_named(name) == direction

@@ -184,3 +184,21 @@ def test_frames_in_the_order_of_a_shell_are_noted_wherever_their_names_begin(
         (tmp_path / f"t_{number}.csv").write_text("x\n")
     _, note = frame_files([f"{before}t_{number}.csv" for number in (1, 10, 2)], "files")
     assert note is not None and "t_10.csv before t_2.csv" in note
+
+
+def test_points_are_paired_by_rows_where_some_are_flagged(tmp_path):
+    rest = np.random.default_rng(1).uniform(-90, 90, (25, 3))
+
+    def places(name, points, lost):
+        lines = ["x,y,z,valid"]
+        lines += [
+            ",".join(map(str, (*row, int(k != lost)))) for k, row in enumerate(points.tolist())
+        ]
+        path = tmp_path / name
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
+    options = FrameOptions(QUANTITIES, reference=places("ref.csv", rest, 3), valid_column="valid")
+    (frame,) = read_frames([places("s.csv", rest + np.array([0.0, 0.0, 2.0]), 17)], options)
+    assert len(frame.points) == 23
+    np.testing.assert_allclose(frame.displacement, np.tile([0.0, 0.0, 2.0], (23, 1)), atol=1e-9)

@@ -100,3 +100,8 @@ def test_chosen_frames_are_as_many_as_requested_and_rising(pressures, data):
     taken = each[list(choose_frames(each, count=count)[0])]
     assert len(taken) == count and (np.diff(taken) > 0).all()
     assert taken[-1] == pytest.approx(each.max())
+
+
+def test_release_without_loaded_frames_asks_for_none():
+    seen = np.array([0.0, 0.01, 0.02, 0.03, 0.0])
+    assert choose_frames(seen, [0.01, 0.02, 0.03], inflation="all")[0] == (1, 2, 3)

@@ -115,6 +115,7 @@ def test_clock_times_become_seconds(export_file, name, first, second, start, end
         ("Running Time,Cycle time\n3,4\n", [3.0]),
         ("Time (d)\n1\n", "line 1, column 'Time (d)': unit 'd' is not one of s, sec, ms, min, h"),
         ("Time,Running time\n1,2\n", "the column of time may be 'Time' or 'Running time'"),
+        ("Zeit/ms\n0\n100\n", [0.0, 0.1]), ("Time/min\n0\n1\n", [0.0, 60.0]),
         ("frame\n1\n", "no header row with the columns one of time"),
         ("time\n1\nx\n", "line 3, column 'time': expected a number, found 'x'"),
     ],

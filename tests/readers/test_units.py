@@ -44,7 +44,8 @@ def test_units_of_columns_are_those_of_si():
         ("Weg in mm", "Weg", "mm"), ("PROBENBREITE <mm>", "PROBENBREITE", "mm"), ("m", "m", ""),
         ("Tensile strain (Extension)", "Tensile strain (Extension)", ""), ("Time", "Time", ""),
         ("Load (Channel 1)", "Load (Channel 1)", ""), ("Strain (mm/mm)", "Strain", "mm/mm"),
-        ("Druck in mbar", "Druck", "mbar"),
+        ("Druck in mbar", "Druck", "mbar"), ("Curvature (1/m)", "Curvature", "1/m"),
+        ("Strain [-]", "Strain", "-"), ("Specimen (1)", "Specimen (1)", ""),
     ],
 )  # fmt: skip
 def test_units_are_split_from_names(name, plain, unit):

@@ -55,3 +55,26 @@ def test_limit_pressure_is_passed_by_volume():
     exact = quad(rigidity, 0, strain)[0]
     assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
     assert min(rigidity(np.linspace(0, strain, 400))) < exact  # there is a limit pressure
+
+
+@pytest.mark.parametrize(
+    ("by_strain", "snaps"), [([0.0, 0.0, 0.0, 20.0], False), ([900.0, -300.0, 0.0, 20.0], True)]
+)
+def test_derivatives_hold_beyond_increments_in_which_the_volume_leaps(by_strain, snaps):
+    """They depend on the strain path, which is followed in small steps there."""
+    beta = np.array([0.0, 0.0, 0.0, 8.0, *by_strain, 0.0, 0.0, -50.0, 30.0])
+    law = HypoelasticLaw(beta, 0.24, [0.5, 0.5, 0.5])
+    model = tube(8, 1, 20.0, [0.02, 0.05], caps=False)
+    history, slopes = MembraneSolver(1e-10).run_with_sensitivity(model, law, ["beta_7", "beta_11"])
+    assert any("snaps" in remark for remark in history.remarks) is snaps
+    assert history.cavity_volume[1] > 1.3 * history.cavity_volume[0]
+    for column, index in enumerate((7, 11)):
+        step = 1e-4 * beta[index]
+        ends = []
+        for sign in (1.0, -1.0):
+            changed = beta.copy()
+            changed[index] += sign * step
+            ends.append(MembraneSolver(1e-10).run(model, replace(law, beta=changed)).displacement)
+        expected = (ends[0] - ends[1]) / (2 * step)
+        error = np.abs(slopes[..., column] - expected).max(axis=(1, 2))
+        assert (error < 2e-4 * np.abs(expected).max(axis=(1, 2))).all()
