@@ -213,12 +213,15 @@ def _displaced(frame: Frame, reference: Frame) -> Frame:
         problem = "holds displacements, and a reference is for files of places alone; leave it out"
         raise InputError(frame.path, "", problem)
     counts = [len(f.points) + sum(f.dropped.values()) for f in (frame, reference)]
-    numbers = [frame.ids, reference.ids]
-    if frame.ids is None or reference.ids is None:
-        numbers = [frame.rows, reference.rows] if counts[0] == counts[1] else [None, None]
+    numbers: Array | NDArray[np.intp] | None = frame.ids
+    reference_numbers: Array | NDArray[np.intp] | None = reference.ids
+    if numbers is None or reference_numbers is None:
+        numbers, reference_numbers = frame.rows, reference.rows
+        if counts[0] != counts[1]:
+            numbers = None
     rows = reference_rows = np.zeros(0, dtype=np.intp)
-    if numbers[0] is not None and numbers[1] is not None:
-        _, rows, reference_rows = np.intersect1d(*numbers, return_indices=True)
+    if numbers is not None and reference_numbers is not None:
+        _, rows, reference_rows = np.intersect1d(numbers, reference_numbers, return_indices=True)
     if not len(rows):
         problem = (
             f"holds {counts[0]} points, the reference {counts[1]}, and no column of point"

@@ -62,6 +62,8 @@ class BiaxialEvaluation:
     residual_strains : DataFrame
         A row for each phase: residual strains (%) before its first loading and after its last, NaN
         where the loads are not those of the file's first row.
+    tables : sequence of BiaxialTable
+        The table of each of these rows.
     """
 
     test: str
@@ -72,6 +74,7 @@ class BiaxialEvaluation:
     first_cycle: ConstantsEvaluation | None
     last_cycle: ConstantsEvaluation | None
     residual_strains: pd.DataFrame
+    tables: Sequence[BiaxialTable]
 
     @property
     def notes(self) -> list[Note]:
@@ -148,8 +151,11 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     with test.place.errors_name(field="data"):
         chosen = designers.evaluate(lines, options)
     residual_strains = []
+    tables: list[BiaxialTable] = []
     for table, cycles in zip(test.tables, test.cycles, strict=True):
-        residual_strains += _residual_strains(table, cycles)
+        rows = _residual_strains(table, cycles)
+        residual_strains += rows
+        tables += [table] * len(rows)
     return BiaxialEvaluation(
         test=test.name,
         paths=paths,
@@ -159,6 +165,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
         first_cycle=_of_cycle(test, 1, options),
         last_cycle=_of_cycle(test, "last", options),
         residual_strains=pd.DataFrame(residual_strains),
+        tables=tuple(tables),
     )
 
 
@@ -246,12 +253,14 @@ def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     EN 17117-1.
     """
     evaluated = {
-        (path.table.name, path.cycle.phase): (path, line)
+        (id(path.table), path.cycle.phase): (path, line)
         for path, line in zip(evaluation.paths, evaluation.lines, strict=True)
     }
     table = []
-    for phase in evaluation.residual_strains.to_dict("records"):
-        path, line = evaluated.get((phase["file"], phase["phase"]), (None, None))
+    phases = evaluation.residual_strains.to_dict("records")
+    # Files of one name may lie in several folders.
+    for measured, phase in zip(evaluation.tables, phases, strict=True):
+        path, line = evaluated.get((id(measured), phase["phase"]), (None, None))
         stiffness, poisson = _constants_of_path(line)
         ends = (NEITHER, NEITHER) if path is None else path.load[[0, -1]]
         row: dict[str, object] = {

@@ -30,7 +30,7 @@ from ...readers.sections import (
     error_in_full,
     path_beside,
 )
-from ...readers.units import LENGTH_UNITS, LOAD_UNITS
+from ...readers.units import LENGTH_UNITS, LOAD_UNITS, PRESSURE_UNITS, TIME_UNITS
 from ...solvers.base import Array, DifferentiatingSolver
 from ...solvers.decks import JOB
 from ...solvers.registry import SURROGATE
@@ -463,7 +463,7 @@ def _read_curve(section: CompareSection, place: Place, at: str, paths: list[Path
         data.append(DataFile(path, table.source({}, {}), len(values[0])))
     x, y = np.hstack(columns)
     name = section.name or section.y.column or probes[1].quantity
-    unit = section.y.unit or {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, "1")
+    unit = {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, section.y.unit or "1")
     return Compared(section, name, QuantityReading(*probes, x), y, unit, tuple(data))
 
 
@@ -501,10 +501,21 @@ def _files(measured: str | list[str], place: Place, field: str, folder: str) -> 
 
 
 def _numbers(table: MachineTable, column: str, quantity: str, unit: str | None) -> Array:
-    """Return the numbers (n,) of a column, in the unit of the quantity if that has one."""
-    if quantity not in UNITS:
-        return table.table.numbers(column)
-    return table.values(column, UNITS[quantity], Channel(unit=unit))
+    """Return the numbers (n,) of a column, in the unit of the quantity if that has one.
+
+    Those of a column of the program's results are converted from the unit in the heading to that
+    of the project.
+    """
+    if quantity in UNITS:
+        return table.values(column, UNITS[quantity], Channel(unit=unit))
+    numbers = table.table.numbers(column)
+    heading = table.units[column]
+    if not unit or not heading or unit == heading:
+        return numbers
+    for units in (LOAD_UNITS, LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS):
+        if unit in units and heading in units:
+            return numbers * (units[heading] / units[unit])
+    raise table.error(column, f"the file says {heading!r}, the project {unit!r}")
 
 
 def _probe_of(section: QuantitySection, place: Place, at: str) -> Probe:

@@ -178,16 +178,26 @@ class Results:
 
 def deck_sets(folder: Path) -> dict[str, list[int]]:
     """Return the nodes of every set in decks of CalculiX, Abaqus and Marc, by name in capitals."""
+    texts = [
+        re.sub(r"^\*\*.*\n", "", path.read_text(encoding="latin-1"), flags=re.MULTILINE)
+        for path in sorted([*folder.glob("*.in[cp]"), *folder.glob("*.dat")])
+    ]
+    # Sets of sets may stand before the sets in them: these are known from the first pass.
+    return _sets_of(texts, _sets_of(texts, {}))
+
+
+def _sets_of(texts: Sequence[str], known: Mapping[str, list[int]]) -> dict[str, list[int]]:
+    """Return the nodes of every set; a set that is defined in several blocks has those of all."""
     sets: dict[str, list[int]] = {}
-    for path in sorted([*folder.glob("*.in[cp]"), *folder.glob("*.dat")]):
-        text = re.sub(r"^\*\*.*\n", "", path.read_text(encoding="latin-1"), flags=re.MULTILINE)
+    for text in texts:
         for block in text.split("\n*"):
             head, *lines = f"*{block.lstrip('*')}".splitlines()
             name = _ABAQUS_SET.match(head)
             if name:
-                sets[name[1].upper()] = _members(head.upper(), lines, sets)
-        for marc_name, members in _MARC_SET.findall(text):
-            sets[marc_name.upper()] = _members("", members.splitlines(), sets)
+                members = _members(head.upper(), lines, {**known, **sets})
+                sets.setdefault(name[1].upper(), []).extend(members)
+        for marc_name, marc_members in _MARC_SET.findall(text):
+            sets[marc_name.upper()] = _members("", marc_members.splitlines(), {**known, **sets})
     return sets
 
 

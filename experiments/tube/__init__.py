@@ -161,6 +161,10 @@ def _read_table(path: Path) -> pd.DataFrame:
     except (OSError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(path, "", f"is not a CSV table: {reason}") from None
+    if not isinstance(table.index, pd.RangeIndex):  # rows are longer than the heading
+        if not table.iloc[:, -1].isna().all():
+            raise InputError(path, "", "a row has more numbers than the heading has names")
+        table = pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
     _check_columns(path, [str(name) for name in table])
     for name in table:
         numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(float)

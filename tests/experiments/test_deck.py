@@ -118,6 +118,21 @@ def test_program_needs_the_permission_of_the_site(tmp_path, monkeypatch):
     assert "deck[0].program: says what is run" in message and "BUBBLEFIT_PROGRAMS_FROM=" in message
 
 
+def test_unit_in_a_heading_counts_beside_a_column_of_the_results(tmp_path, monkeypatch):
+    (plain,) = bar(tmp_path, monkeypatch).tests["bar"].matched.values()
+    path = tmp_path / "frame.csv"
+    heading, *rows = path.read_text().splitlines()
+    assert plain.unit == "N" and "force" in heading
+    for unit, factor in (("kN", 1e3), ("N", 1.0)):
+        path.write_text("\n".join([heading.replace("[N]", f"[{unit}]"), *rows]) + "\n")
+        (compared,) = read_project(tmp_path / "project.toml").tests["bar"].matched.values()
+        assert compared.load == pytest.approx(factor * plain.load)
+    path.write_text("\n".join([heading.replace("[N]", "[MPa]"), *rows]) + "\n")
+    assert "the file says 'MPa', the project 'N'" in complaint(
+        read_project, tmp_path / "project.toml"
+    )
+
+
 def test_readings_of_several_specimens_are_one_curve(tmp_path, monkeypatch):
     write_curve(tmp_path / "second.csv", noise=0.01)
     change = [('measured = "frame.csv"', 'measured = ["frame.csv", "second.csv"]')]

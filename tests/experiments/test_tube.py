@@ -76,3 +76,14 @@ def test_missing_columns_of_a_tube_are_named(tmp_path, before, after, field):
     file.write_text(file.read_text().replace(before, after))
     raised = refused(read_project, path)
     assert raised.path == file and raised.field == field
+
+
+def test_numbers_beyond_the_heading_of_a_tube_are_refused_and_a_comma_at_the_end_is_not(tmp_path):
+    path = project(tmp_path)
+    file = tmp_path / "tube.csv"
+    expected = read_project(path).tests["tube"].strain
+    heading, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([heading, *(f"{row}," for row in rows)]) + "\n")
+    assert np.array_equal(read_project(path).tests["tube"].strain, expected, equal_nan=True)
+    file.write_text("\n".join([heading, *(f"{row},99" for row in rows)]) + "\n")
+    assert "more numbers than the heading" in refused(read_project, path).problem

@@ -19,7 +19,13 @@ from bubblefit.experiments.biaxial.evaluation import (
 from bubblefit.materials.designers import Options
 from bubblefit.materials.law import HypoelasticLaw
 
-from ...builders.biaxial_tests import THICKNESS, biaxial_project, biaxial_rows, write_biaxial_rows
+from ...builders.biaxial_tests import (
+    HEAD,
+    THICKNESS,
+    biaxial_project,
+    biaxial_rows,
+    write_biaxial_rows,
+)
 from ...support.refusals import complaint
 
 #: So stiff that strains are small, and the constants those of linear elasticity.
@@ -147,3 +153,23 @@ def test_lines_for_the_terminal_have_constants_and_their_spread(evaluation):
     assert "strain paths of ratios 1:1, 2:1, 1:2, 1:0, 0:1" in text
     assert "direct form: A warp" in text and "first cycles: E warp" in text
     assert f"over {1 + len(evaluation.alternatives)} choices" in text
+
+
+def test_rows_of_the_standard_go_by_file_also_where_names_are_alike(tmp_path):
+    names = {"1:1": "a", "2:1": "b", "1:2": "c", "1:0": "d", "0:1": "e"}
+    rows = biaxial_rows(LINEAR, cycles=1)
+    files = {}
+    for ratio, folder in names.items():
+        (tmp_path / folder).mkdir()
+        files[ratio] = [f"{folder}/test.csv"]
+        of_ratio = [row[1:] for row in rows if row[0] == ratio]
+        write_biaxial_rows(tmp_path / folder / "test.csv", of_ratio, HEAD.removeprefix("ratio,"))
+    path = biaxial_project(tmp_path)
+    text = path.read_text()
+    assert 'files = ["test.csv"]' in text
+    listed = ", ".join(f'"{ratio}" = {paths}' for ratio, paths in files.items())
+    path.write_text(text.replace('files = ["test.csv"]', f"files = {{ {listed} }}"))
+    table = standard_table(evaluate_test(bf.read_project(path).tests["biaxial"]))
+    for row in table.to_dict("records")[:-1]:
+        warp, fill = map(float, row["ratio"].split(":"))
+        assert row["warp_to_kN_per_m"] * fill == pytest.approx(row["fill_to_kN_per_m"] * warp)

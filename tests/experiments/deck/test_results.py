@@ -58,6 +58,15 @@ def test_sets_of_a_deck_are_read_by_name(tmp_path):
     assert sets == {"ALL": [1, 2], "GRIP": [3, 6, 9], "BOTH": [20, 3, 6, 9]}
 
 
+def test_sets_in_several_blocks_and_of_later_sets_are_whole(tmp_path):
+    (tmp_path / "a.inp").write_text("*NSET, NSET=BOTH\nLEFT, RIGHT\n")
+    blocks = "*NSET, NSET=LEFT\n1, 2\n*NSET, NSET=RIGHT\n3\n*NSET, NSET=LEFT\n4\n"
+    nodes = "*NODE, NSET=N1\n1, 0., 0., 0.\n*NODE, NSET=N1\n2, 1., 0., 0.\n"
+    (tmp_path / "mesh.inp").write_text(blocks + nodes)
+    sets = {"BOTH": [1, 2, 4, 3], "LEFT": [1, 2, 4], "RIGHT": [3], "N1": [1, 2]}
+    assert deck_sets(tmp_path) == sets
+
+
 def test_curve_is_read_where_it_was_measured(tmp_path):
     write(tmp_path, [(0, 0), (1, 3.25), (2, 4)])
     history = read(tmp_path, [1.0, 2.0])
