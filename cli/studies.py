@@ -120,6 +120,20 @@ def study_options(
     return common.with_options(*options, common.OVERWRITE, common.AS_JSON, common.QUIET)
 
 
+def _strains_by_modulus(
+    moduli: Sequence[str], usual_strains: Sequence[float]
+) -> dict[str, list[float]]:
+    """Return the strains of each --modulus NAME or NAME=STRAINS, the usual ones without any."""
+    strains_of: dict[str, list[float]] = {}
+    for text in moduli:
+        name, equals, strains = text.partition("=")
+        if name in strains_of and not (usual_strains or (equals and strains_of[name])):
+            raise InputError(None, "--modulus", f"{name} is given twice, once without strains")
+        chosen_strains = common.numbers(strains, "--modulus") if equals else usual_strains
+        strains_of.setdefault(name, []).extend(chosen_strains)
+    return strains_of
+
+
 @command(
     "profile",
     "bubblefit profile fabric.toml",
@@ -166,13 +180,7 @@ def profile_command(
     usual_strains = [] if strain is None else common.numbers(strain, "--strain")
     if usual_strains and not moduli:
         raise InputError(None, "--strain", "goes with --modulus NAME")
-    strains_of: dict[str, list[float]] = {}
-    for text in moduli:
-        name, equals, strains = text.partition("=")
-        if name in strains_of and not (usual_strains or (equals and strains_of[name])):
-            raise InputError(None, "--modulus", f"{name} is given twice, once without strains")
-        chosen_strains = common.numbers(strains, "--modulus") if equals else usual_strains
-        strains_of.setdefault(name, []).extend(chosen_strains)
+    strains_of = _strains_by_modulus(moduli, usual_strains)
     progress = common.LiveLine("sides", common.quiet(options))
     settings = {"moduli": strains_of or None, "card": options["card"], "parameters": parameters}
     run_study(profile, "profile", project, options, progress, **settings)

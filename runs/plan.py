@@ -390,7 +390,7 @@ def _ends(card: MaterialCard, optimum: CardOptimum, strain: Sequence[float] | No
     if strain is not None:
         ends = np.array(strain, dtype=float)
         if ends.shape != (3,) or not ((ends > 0) & (ends < 2)).all():
-            problem = "expected three strains between 0 and 2 (warp, fill, shear), 0.05 for 5 %"
+            problem = "expected three strains between 0 and 2 (warp, fill, shear), not in percent"
             raise InputError(None, "--strain", f"{problem}; got {strain}")
         return ends
     valid = card.law.strain_range

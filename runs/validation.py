@@ -33,7 +33,7 @@ from .predictions import Predictions, is_measured, predict
 from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
-from .setup import FitSetup, fingerprints, prepare_fit
+from .setup import FitSetup, fingerprints, prepare_fit, tests_with_weight
 from .simulation import StudyRecord, begin_study
 from .starts import reached_by
 from .verdict import large_errors, state_of_predictions
@@ -413,14 +413,12 @@ def validate(
         As in `fit`; InputError also if there are fewer than two tests or parts.
     """
     if cards:
-        if forms or leave != TESTS:
-            problem = "goes with neither --form nor --leave: nothing is fitted"
-            raise InputError(project.path, "--card", problem)
+        _check_alone(project, forms, leave)
         check_unused(out, False, overwrite)
         return finished(judge_cards(project, chosen_cards(project, cards), tests), out)
     output = OutputSettings.of(out, resume, overwrite, command_line)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
-    chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
+    chosen = tests_with_weight(project, project.chosen(tests, fitted=True))
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}
@@ -436,6 +434,13 @@ def validate(
         analyses += fit_to_all.best.analyses
         judged += fits.judge(fit_to_all, omissions[form], leave, starts, folder)
     return finished(Validation(project, tuple(judged), leave, analyses), out)
+
+
+def _check_alone(project: Project, forms: Sequence[str], leave: str) -> None:
+    """Refuse forms or parts to leave out beside cards, with which nothing is fitted."""
+    if forms or leave != TESTS:
+        problem = "goes with neither --form nor --leave: nothing is fitted"
+        raise InputError(project.path, "--card", problem)
 
 
 def _begin(output: OutputSettings, forms: Sequence[str], leave: str, count: int) -> Path | None:

@@ -25,7 +25,7 @@ from .held_out import errors
 from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .result import Fit
-from .setup import FitSetup, fingerprints
+from .setup import FitSetup, fingerprints, tests_with_weight
 from .simulation import FAILED, StudyRecord, begin_study
 
 #: Number of random starts of the fit at the project's weights.
@@ -262,7 +262,7 @@ def weights(
     output = OutputSettings.of(out, resume, overwrite, command_line)
     on_event = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
-    chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
+    chosen = tests_with_weight(project, project.chosen(tests, fitted=True))
     names = [test.name for test in chosen if counted in (test.kind, test.name)]
     if not names or len(names) == len(chosen):
         options = ", ".join(dict.fromkeys(name for t in chosen for name in (t.kind, t.name)))

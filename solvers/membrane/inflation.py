@@ -79,8 +79,7 @@ def through_snap(
     try:
         while step >= settings.smallest_step and volume < settings.max_growth * initial_volume:
             constant = (outer_pressure + pressure) * volume * (1.0 + step)
-            for filled in membranes:
-                filled.gas = ClosedGas(constant, outer_pressure)
+            _fill(membranes, ClosedGas(constant, outer_pressure))
             displacement = membrane.equilibrium(u + step * slope, 0.0)
             if displacement is None and step < 0.5 * settings.step:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.
@@ -92,8 +91,7 @@ def through_snap(
                 slope = np.zeros_like(u)
                 continue
             if membrane.pressure >= level:
-                for filled in membranes:
-                    filled.gas = None
+                _fill(membranes, None)
                 return membrane.equilibrium(displacement, level)
             neighbours.follow(membrane, displacement)
             membrane.accept()
@@ -104,8 +102,13 @@ def through_snap(
             step = min(settings.step, settings.step_growth * step)
         return None
     finally:
-        for filled in membranes:
-            filled.gas = None
+        _fill(membranes, None)
+
+
+def _fill(membranes: Sequence[ClosedMembrane], gas: ClosedGas | None) -> None:
+    """Give membranes the same closed gas, or none."""
+    for membrane in membranes:
+        membrane.gas = gas
 
 
 def analyse_inflated(
