@@ -257,6 +257,9 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     """Write a project for the files of a folder; what they do not tell is asked for, or marked."""
     from ..project.data_folder import proposed_tests, recognised_groups
 
+    for kind in WRITABLE:
+        if settings.get(kind):
+            raise InputError(None, f"--{kind}", "goes without --data, whose files tell the tests")
     path = folder / PROJECT
     _check_free(path)
     groups = recognised_groups(data)

@@ -185,7 +185,7 @@ def _above_numbers(
     unit_names = "|".join(sorted(units, key=len, reverse=True))
     statement = re.compile(
         rf"(?<!\w){re.escape(name)}(?:_({unit_names}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
-        rf"[\s:=;,]*({NUMBER})(?:[\s;,]*({unit_names})(?!\w))?"
+        rf"[\s:=;,]*({NUMBER})(?![\d.,]*\d)(?:[\s;,]*({unit_names})(?!\w))?"
     )
     matches = []
     for line, text in lines[:MAX_LINES_ABOVE]:

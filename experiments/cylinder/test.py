@@ -477,7 +477,8 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
         raise place.error("pressure", f"{pressure:g} lies outside wall.pressure, {ends}")
     is_braid = section.yarn is not None
     keys = BRAID_KEYS if is_braid else PLAIN_KEYS
-    _check_wall_keys(section, keys, PLAIN_KEYS if is_braid else BRAID_KEYS, place)
+    foreign_keys = (*PLAIN_KEYS, "poisson") if is_braid else (*BRAID_KEYS, "across")
+    _check_wall_keys(section, keys, foreign_keys, place)
     optional = "across" if is_braid else "poisson"
     values = {
         key: _at_pressure(section, key, listed, pressure, place)
@@ -499,9 +500,12 @@ def _check_wall_keys(
     """Raise InputError unless a wall has all keys of its kind, and none of the other kind."""
     missing = [key for key in keys if getattr(section, key) is None]
     misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
-    if missing or misplaced:
+    if misplaced:
+        kind = "a plain wall" if "yarn" in keys else "a braid"
+        raise place.error(f"wall.{misplaced[0]}", f"is of {kind}; {', '.join(keys)} are of another")
+    if missing:
         problem = f"expected {', '.join(PLAIN_KEYS)}, or of a braid {', '.join(BRAID_KEYS)}"
-        raise place.error(f"wall.{(missing or misplaced)[0]}", problem)
+        raise place.error(f"wall.{missing[0]}", problem)
 
 
 def _at_pressure(

@@ -450,6 +450,10 @@ def _read_curve(section: CompareSection, place: Place, at: str, paths: list[Path
         raise place.error(at, 'expected x and y, or quantity = "displacement" with set and times')
     axes = {"elongation": section.x, "load": section.y}
     probes = _probe_of(section.x, place, f"{at}.x"), _probe_of(section.y, place, f"{at}.y")
+    kinds = {probe.quantity for probe in probes}
+    if "result" in kinds and len(kinds) > 1:
+        problem = "a table has no times and no nodes: give result = COLUMN in both x and y"
+        raise place.error(at, problem)
     named = {quantity: axis.column for quantity, axis in axes.items() if axis.column}
     columns = []
     data = []

@@ -285,6 +285,9 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     if _is_file_missing(place, listed, tables):
         return _without_data(place, tables)
     if data.polynomials is not None:
+        for key in ("compliance", "compliance_prior"):
+            if getattr(section, key):
+                raise place.error(key, "needs measured points (data.files), not polynomials")
         strips = _published(place, section, tables, listed[0][0])
     else:
         strips = _measured(place, section, tables, listed, width)

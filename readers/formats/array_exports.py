@@ -69,7 +69,13 @@ def _frames(
     tables: Iterable[Array],
     **settings: Any,
 ) -> list[Frame]:
-    """Return a frame a table (points, names), with settings of its `FrameRows`."""
+    """Return a frame a table (points, names), with settings of its `FrameRows`.
+
+    Raise InputError where the options name a column of flags, which these files do not have.
+    """
+    for key in ("flag_column", "valid_column"):
+        if getattr(options, key) is not None:
+            raise InputError(path, key, "is of tables in text; this file holds arrays")
     frames = []
     for table in tables:
         rows = FrameRows(dict(zip(names, table.T, strict=True)), names, **settings)

@@ -19,7 +19,6 @@ from .loading import IncrementRecord, Loading, RunRequest, march, reach_in_halve
 from .membrane import initial_moduli
 from .relaxation import settled
 from .sensitivity import Neighbours
-from .wall import LEFT
 
 Array = NDArray[np.float64]
 
@@ -142,16 +141,10 @@ def analyse_inflated(
     membrane.wrinkle[:] = 0.0
     neighbours = Neighbours(membrane, request.parameters)
     levels = np.array(model.pressures)
-    membranes = [membrane, *neighbours.membranes]
-    if model.bending is not None:
+    if model.bending is not None and membrane.wrinkle_stiffness is not None:
         # Every third is enough, as only the last is reported and the law hardly depends on
-        # increments. A wall that carries compression first wrinkles, as its caps could fold in
-        # many ways on the way up, and does not from the full pressure on.
+        # increments. With a stiff wall, whose caps fold in large steps, none is left out.
         levels = levels[::-3][::-1]
-        if membrane.wall.wrinkle_stiffness is None:
-            levels = np.append(levels, levels[-1])
-        for inflated_membrane in membranes:
-            inflated_membrane.wrinkle_stiffness = membrane.wall.wrinkle_stiffness or LEFT
     volume = np.zeros(len(levels))
     wrinkled = np.zeros(len(levels))
     sides = np.ones(len(model.mesh.quads), dtype=bool)
@@ -166,11 +159,6 @@ def analyse_inflated(
         record.accept(i, u)
         volume[i] = membrane.volume
         wrinkled[i] = membrane.wrinkled_share(sides)
-        if i == len(levels) - 2:
-            for inflated_membrane in membranes:
-                inflated_membrane.wrinkle_stiffness = membrane.wall.wrinkle_stiffness
-                if membrane.wall.wrinkle_stiffness is None:
-                    inflated_membrane.wrinkle[:] = 0.0
     remarks = filling.remarks()
     if model.bending is not None:
         released = _released(membrane, model, record.path[-1], neighbours)

@@ -312,3 +312,8 @@ def test_the_data_of_the_example_are_small():
 def test_a_data_folder_needs_own(tmp_path):
     with pytest.raises(InputError, match="means nothing without --own"):
         start.init_command.callback.__wrapped__(tmp_path, None, False, None, data=DATA)
+
+
+def test_number_of_tests_is_refused_beside_files_that_tell_it(tmp_path):
+    run = ("init", "mine", "--own", "--data", DATA, "--bubble", 3, "--thickness", 0.8)
+    one_line(in_process(*run, cwd=tmp_path, code=2), "--bubble: goes without --data")

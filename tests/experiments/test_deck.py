@@ -102,6 +102,7 @@ def test_deck_of_marc_runs_in_the_stand_in(tmp_path, monkeypatch, marc):  # noqa
         ('result = "force_N"', 'reaction = "z"', "compare[0].y: expected a node set (set), or a"),
         ("noise = 0.002", "nois = 0.002", "compare[0].nois: unknown key; did you mean 'noise'"),
         ('"solve.py"', "", "program: there is no program nothing; name another"),
+        ('result = "travel_mm"', "time = 1.0", "compare[0]: a table has no times and no nodes"),
     ],
 )
 def test_mistake_is_one_line(tmp_path, monkeypatch, old, new, words):

@@ -48,6 +48,7 @@ NEITHER = ["neither a column 'p' nor a line"]
         (f"{POINTS};p [V]\n0;0;0;0;1;high\n0;0;0;0;1;3\n0;0;0;0;1;low\n", ["line 4", "'low'"]),
         (f"{POINTS};p\n0;0;0;0;1;\n0;0;0;0;1;n/a\n", ["line 1, column 'p': holds no number"]),
         (f"{POINTS}\n0;0;0;0;1\n", NEITHER), ("xp = 3 kPa\np2 = 4 kPa\n", NEITHER),
+        ("p = 1,013.5 hPa\n", NEITHER),
         # A column of words is none, and a row with too few cells is none of the table.
         ("p [kPa],q,r,s\n3,a,b,c\n3,a,b,c\n", NEITHER), ("p,q,r [kPa]\n3\n3\n", NEITHER),
         (f"p = 3 kPa\np = 4 kPa\n{POINTS}\n0;0;0;0;1\n", ["line 2", "another 'p' than line 1"]),

@@ -124,6 +124,7 @@ def test_mistake_in_a_cylinder_section_is_one_line(tmp_path, old, new, words):
         ("yarn = [1000.0, 2000.0]", "yarn = [1.0]", "cylinder[0].wall.yarn", "expected 2"),
         ("angle = 65.0,", "", "cylinder[0].wall.angle", "braid"),
         ("angle = 65.0", "angle = 50.0", "cylinder[0].wall.angle", "54.7"),
+        ("angle = 65.0", "angle = 65.0, poisson = 0.4", "cylinder[0].wall.poisson", "a plain wall"),
         ("stiffness = 8e5", "", "cylinder[0].cord[1]", "stiffness"),
         (
             "stiffness = 8e5",

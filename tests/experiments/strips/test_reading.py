@@ -42,6 +42,12 @@ def example_strips(tmp_path) -> Edit:
     )
 
 
+@pytest.mark.parametrize("key", ["compliance", "compliance_prior"])
+def test_compliance_is_refused_beside_polynomials(example_strips, key):
+    change = "width = 25.0", f"{key} = 1e-3\nwidth = 25.0"
+    assert f"strips[0].{key}: needs measured points" in complaint(example_strips, change)
+
+
 def test_the_published_polynomials_in_mm(example_strips):
     p = example_strips()
     assert (p.width, p.grip_distance, p.bias_angle) == (25.0, 75.0, 45.0)
