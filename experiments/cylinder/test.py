@@ -502,7 +502,7 @@ def _check_wall_keys(
     misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
     if misplaced:
         kind = "a plain wall" if "yarn" in keys else "a braid"
-        raise place.error(f"wall.{misplaced[0]}", f"is of {kind}; {', '.join(keys)} are of another")
+        raise place.error(f"wall.{misplaced[0]}", f"is of {kind}, and {keys[0]} of another kind")
     if missing:
         problem = f"expected {', '.join(PLAIN_KEYS)}, or of a braid {', '.join(BRAID_KEYS)}"
         raise place.error(f"wall.{missing[0]}", problem)

@@ -285,9 +285,6 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     if _is_file_missing(place, listed, tables):
         return _without_data(place, tables)
     if data.polynomials is not None:
-        for key in ("compliance", "compliance_prior"):
-            if getattr(section, key):
-                raise place.error(key, "needs measured points (data.files), not polynomials")
         strips = _published(place, section, tables, listed[0][0])
     else:
         strips = _measured(place, section, tables, listed, width)
@@ -346,6 +343,9 @@ def _published(
     path: Path,
 ) -> dict[str, Strip]:
     """Return the strips of a file of load polynomials, by direction."""
+    for key in ("compliance", "compliance_prior"):
+        if getattr(section, key):
+            raise place.error(key, "needs measured points (data.files), not polynomials")
     format = named_format(place, "data.format", "load polynomials", section.data.format)
     curves = read_published_polynomials(path, format)
     strips = {}
