@@ -149,7 +149,7 @@ class LearningSolver(Protocol):
 
 
 class ComparisonState(NamedTuple):
-    """What analyses change of a comparison."""
+    """Hold what analyses change of a comparison."""
 
     warm_start: WarmStart | None
     objective: Objective

@@ -372,7 +372,6 @@ def _step_by_error(
 
 
 PRIOR = 10.0  # relative standard deviation of a modulus of which the data say nothing
-
 #: Mesh error that may be left after extrapolation to ever finer meshes, as a share of the step of
 #: the extrapolation (one standard deviation): with data without noise, a mesh of 432 quads leaves
 #: 6 to 12 % of what it moves the moduli by (benchmarks/bench_bands.py bias).
@@ -417,14 +416,11 @@ class SecondOrderTerms:
 
 
 SECOND_ORDER = NoteKind("second order")
-
 LARGE_MISFIT = 2.0  # residual over the noise from which on second-order terms may matter
-
 WORTHWHILE_CHANGE = 0.1  # least relative change of a modulus' sigma for which they are used
 
 # Why the second order is not used.
 NOT_DEFINITE = "not positive definite"
-
 TOO_LITTLE = "too little changes"
 
 

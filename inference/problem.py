@@ -90,7 +90,7 @@ class _Run:
 
 @dataclass(frozen=True, eq=False)
 class _Analysis:
-    """What a process needs to run a comparison.
+    """Hold what a process needs to run a comparison.
 
     Attributes
     ----------
@@ -139,8 +139,8 @@ class _Team:
         """Run all comparisons; one behind a failure is left as if it had not run."""
         before = [comparison.state for comparison in self.comparisons]
         messages = [
-            replace(analysis, state=None if own.is_same(known) else own)
-            for own, known in zip(before, self.states, strict=True)
+            replace(analysis, state=None if state.is_same(state_of_copy) else state)
+            for state, state_of_copy in zip(before, self.states, strict=True)
         ]
         runs = self.copies.run(messages)
         has_failed = False

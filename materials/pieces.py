@@ -71,7 +71,7 @@ class PointState(NamedTuple):
 
 
 class LawTangent(NamedTuple):
-    """What `point_law.stress_update` writes beside a state.
+    """Hold what `point_law.stress_update` writes beside a state.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class LawTangent(NamedTuple):
 
 
 class PointResponse(NamedTuple):
-    """What `point_law.membrane_stress` writes beside a state.
+    """Hold what `point_law.membrane_stress` writes beside a state.
 
     Attributes
     ----------

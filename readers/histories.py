@@ -401,11 +401,21 @@ def _loading_rate(
         Rows of the loading.
     """
     rows = slice(cycle.start, cycle.peak + 1)
-    levels = [share * load[cycle.peak] for share in RATE_LEVELS]
-    strains = [passage(load[rows], strain[rows], level)[1] for level in levels]
-    times = [passage(load[rows], time[rows], level)[1] for level in levels]
-    duration = times[1] - times[0]
-    return [(strains[1] - strains[0]) / duration] if duration > 0 else []
+    strain_change = change_on_branch(load[rows], strain[rows])
+    duration = change_on_branch(load[rows], time[rows])
+    return [strain_change / duration] if duration > 0 else []
+
+
+def change_on_branch(load: Array, reading: Array) -> float:
+    """Return a reading at the higher of `RATE_LEVELS` of a branch less that at the lower.
+
+    Parameters
+    ----------
+    load, reading : (n,) array
+        Of the branch, whose largest load the levels are shares of; NaN if a level is not passed.
+    """
+    lower, higher = (passage(load, reading, share * load.max())[1] for share in RATE_LEVELS)
+    return float(higher - lower)
 
 
 def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:

@@ -1,4 +1,4 @@
-"""What a fit of a bubble does not know beside the law: nuisance unknowns, and errors of the sheet.
+"""Describe what a fit of a bubble seeks beside the law: nuisance unknowns, errors of the sheet.
 
 Nuisance unknowns are offsets, the shape of the sheet, and the misalignment of the registration.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...notes import Note
-from ...readers.histories import RATE_LEVELS, Cycle, Hold, LoadHistory, passage
+from ...readers.histories import Cycle, Hold, LoadHistory, change_on_branch, passage
 from ...solvers.base import Array
 
 
@@ -293,10 +293,8 @@ def _rate(history: LoadHistory, rows: slice) -> float:
     if history.time is None:
         return math.nan
     load = history.load[rows]
-    levels = np.array(RATE_LEVELS) * load.max()
-    times = [passage(load, history.time[rows], level)[1] for level in levels]
-    duration = abs(times[1] - times[0])
-    return float((levels[1] - levels[0]) / duration) if duration > 0 else math.nan
+    duration = abs(change_on_branch(load, history.time[rows]))
+    return change_on_branch(load, load) / duration if duration > 0 else math.nan
 
 
 def has_same_peak(values: CycleValues, previous: CycleValues) -> bool:

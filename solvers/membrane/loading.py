@@ -35,7 +35,7 @@ class IncrementProgress:
 
 @dataclass(frozen=True, eq=False)
 class RunRequest:
-    """What is asked of an analysis besides its model.
+    """Hold what is asked of an analysis besides its model.
 
     Attributes
     ----------

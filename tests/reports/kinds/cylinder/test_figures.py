@@ -116,7 +116,7 @@ def test_bodies_touch_the_inflated_beam(quarter):
 
 # The picture shows the run's own places, strains and bodies
 def places(model, moved, name, axes):
-    """Of the nodes of a set and their mirror image in the first of two axes, (k, 2) mm."""
+    """Return places (k, 2) mm of the nodes of a set, and their mirror image in the first axis."""
     at = (model.mesh.points + moved)[model.mesh.node_sets[name]][:, axes]
     return np.concatenate([at, at * [-1.0, 1.0]])
 
