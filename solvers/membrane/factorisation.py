@@ -75,6 +75,7 @@ class SingularTangent(Exception):
     """The tangent cannot be factorised at the present state."""
 
 
+#: Returns the approximate solution (free,) of the linear equations for a right-hand side (free,).
 NearInverse = Callable[[Array], Array]
 
 
@@ -287,7 +288,7 @@ class BandedTangent(StoredTangent):
 
     Parameters
     ----------
-    rank : array
+    rank : (free,) array of int
         New number of each free unknown.
     """
 
@@ -371,8 +372,12 @@ class SymmetricBand:
 
     Attributes
     ----------
-    rank, order : array
-        As in `BandedTangent`.
+    factor : (width + 1, free) array
+        Lower band of the factor of the renumbered matrix.
+    rank : (free,) array of int
+        New number of each free unknown.
+    order : (free,) array of int
+        Inverse of `rank`.
     """
 
     factor: NDArray[np.float32]
@@ -380,6 +385,7 @@ class SymmetricBand:
     order: NDArray[np.int64]
 
     def __call__(self, rhs: Array) -> Array:
+        """Return the approximate solution (free,) for a right-hand side (free,)."""
         ordered = rhs[self.order].astype(np.float32)
         x, _ = scipy.linalg.lapack.spbtrs(self.factor, ordered, lower=1, overwrite_b=1)
         return np.asarray(x[self.rank], dtype=float)
