@@ -118,15 +118,15 @@ def held_out(
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
-    """Return unknowns y (unknowns,) with these values of the nuisance, 0 of those without one."""
+    """Return unknowns y (unknowns,) with these values of the nuisance, others at their start."""
     unknowns = y.copy()
-    # Parameters of decks have one value in all comparisons, so that any of them has it.
-    of_decks = {name: value for values in nuisance.values() for name, value in values.items()}
+    # Shared parameters have one value in all comparisons, so that any of them has it.
+    shared = {name: value for values in nuisance.values() for name, value in values.items()}
     for comparison in problem.comparisons:
         values = nuisance.get(comparison.name, {})
         positions = problem.unknowns.nuisance_positions(comparison.name)
         unknowns[positions] = [
-            (of_decks if n.drawn else values).get(n.name, 0.0) for n in comparison.nuisance
+            (shared if n.shared else values).get(n.name, n.start) for n in comparison.nuisance
         ]
     return unknowns
 

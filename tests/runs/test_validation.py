@@ -15,6 +15,7 @@ from bubblefit.runs import validation
 from bubblefit.runs.result import Fit
 from bubblefit.runs.validation import fit_without, omittable_parts
 
+from ..builders.biaxial_tests import BENT_LAW, biaxial_project, biaxial_rows, write_biaxial_rows
 from ..builders.closed_forms import LAW
 from ..builders.projects import (
     CONSTANT_BUBBLE,
@@ -125,6 +126,33 @@ def test_impossible_omission_is_refused_before_any_fit(bubble, tmp_path):
     ):
         done = in_process("validate", "project.toml", *options, cwd=tmp_path, code=2)
         assert words in done.output
+
+
+def errors_without(path, sort):
+    """Relative errors at each part of one sort of the fit without it."""
+    setup = fit_setup(path)
+    return [fit_without(setup, part, 1).error for part in omittable_parts(setup, sort)]
+
+
+def test_omitted_ratio_is_judged_with_load_share_of_others(tmp_path):
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1", "2:1", "1:2"]))
+    sure = errors_without(biaxial_project(tmp_path, "load_share = 0.9", "constant"), "ratios")
+    test = "load_share = 0.9\nload_share_deviation = 0.001"
+    unsure = errors_without(biaxial_project(tmp_path, test, "constant"), "ratios")
+    assert min(sure) > 1e-3
+    assert unsure == pytest.approx(sure, rel=0.03)
+
+
+def test_omitted_direction_is_judged_with_compliance_of_other(tmp_path):
+    balanced = ('form = "constant"', 'form = "constant"\nsymmetry = "balanced"')
+    bounds = ("E2 = [0.03, 1.0]\n", "")
+    errors = []
+    for prior in ("", "compliance_prior = 1e-6\n"):
+        compliance = ('name = "one"\n', f'name = "one"\ncompliance = 2e-4\n{prior}')
+        path = constant_strips(tmp_path, balanced, bounds, compliance)
+        errors.append(errors_without(path, "directions"))
+    assert min(errors[0]) > 0.03
+    assert errors[1] == pytest.approx(errors[0], rel=0.03)
 
 
 def warp_of_two(modulus):
