@@ -512,6 +512,7 @@ class Kind(BaseKind, Protocol):
         """
 
 
+#: No test pulls so that a modulus, mostly G12, is determined.
 UNMATCHED = NoteKind("unmatched direction", weight=9)
 DIRECTIONS_MISSED = NoteKind(
     "directions missed",

@@ -268,7 +268,7 @@ class StrainObjective(Objective):
     Parameters
     ----------
     load : (rows, 2 or 3) array
-        The measured loads.
+        Measured loads: N/mm along warp and fill, or MPa, N and N mm of a tube.
     strain : (rows, blocks) array
         The measured strains, which are not in %.
     scale : float or None
@@ -305,8 +305,8 @@ class StrainObjective(Objective):
         scales = np.full(blocks, scale)
         if scale is None:
             scales = np.maximum(np.abs(self.measured_strain).max(axis=0), USUAL_NOISE)
-        self._unit = scales * np.sqrt(count) / max(weight, 1e-300)
-        self.scale = PERCENT * np.repeat(self._unit, count)
+        self._divisors = scales * np.sqrt(count) / max(weight, 1e-300)
+        self.scale = PERCENT * np.repeat(self._divisors, count)
 
     @property
     def measured_strain(self) -> Array:
@@ -344,6 +344,6 @@ class StrainObjective(Objective):
 
         m is the number of matched rows times the number of blocks.
         """
-        units = self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
-        residuals = values[self.first_row :] / units
+        divisors = self._divisors.reshape(1, -1, *(1,) * (values.ndim - 2))
+        residuals = values[self.first_row :] / divisors
         return np.swapaxes(residuals, 0, 1).reshape(-1, *values.shape[2:])

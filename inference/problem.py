@@ -98,7 +98,7 @@ class _Analysis:
     with_jacobian, warm : bool
         See `FitProblem.evaluate`.
     state : ComparisonState, optional
-        That of the comparison, where a copy of this process has another one.
+        State of the comparison to take before the run; None where the copy has it already.
     """
 
     unknowns: Array

@@ -459,6 +459,7 @@ class _CorrectedFit:
         y : (unknowns,) array
             Unknowns where the fit begins.
         """
+        # A method may have switched them off at the end of the last round.
         self.surrogate.warm_starts = True
         max_analyses = self.surrogate.analyses + self.options.max_analyses
         options = replace(self.options, max_analyses=max_analyses)

@@ -191,8 +191,8 @@ class Law(Keys):
         The name of a form, or a form of one's own: a subclass of `bubblefit.Form` or its object.
     **keys
         Keys of [law]: `bounds`, the [smallest, largest] values of E1, E2 and G12 in MPa, by default
-        those of coated fabrics; `nu12`, `strain_range`, `margin`, `closed_path`, `memory`. All
-        other keys are settings of the form, such as `knots`.
+        those of coated fabrics; `nu12`, `symmetry`, `strain_range`, `margin`, `closed_path`,
+        `memory`. All other keys are settings of the form, such as `knots`.
 
     Raises
     ------

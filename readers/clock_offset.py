@@ -415,6 +415,11 @@ def _unexplained(
     """Return the share of the variance of y that a rising function of x leaves unexplained.
 
     The function goes near (x_rest, y_rest), the state of rest.
+
+    Parameters
+    ----------
+    x, y : (n,) array
+        Pressures and raised heights, either way round.
     """
     total = np.sum((y - y.mean()) ** 2)
     if not total > 0:

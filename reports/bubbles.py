@@ -144,7 +144,7 @@ def cut_charts(
     name : str
         Name of the figure.
     pressures : (frames,) array, MPa
-        Pressure of each frame, in rising order.
+        Pressure of each frame; colours follow the order of the frames.
     points : (n, 2) or (n, 3) array, mm
         Nodes at rest, of a full or a quarter mesh.
     displacement : (frames, n, 3) array, mm
@@ -182,7 +182,7 @@ def height_charts(
     Parameters
     ----------
     pressures : (frames,) array_like, MPa
-        Pressure of each frame, in rising order.
+        Pressure of each frame; colours follow the order of the frames.
     measured, modelled : sequence of (k,) array_like, mm
         Heights z at the same places, an array for each frame.
     measured_label : str

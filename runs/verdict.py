@@ -364,7 +364,7 @@ class Answer:
     end : bool
         Whether this is the largest strain for which the modulus is fitted.
     sigma : float or None
-        One standard deviation over the modulus; None if not known.
+        Half the width of the 68 % interval over the modulus; None if not known.
     band : tuple of float, or None
         Ends of the 95 % band, MPa; None if not known.
     bounds : tuple of bool

@@ -61,7 +61,9 @@ class BiaxialEvaluation:
         determine them.
     residual_strains : DataFrame
         A row for each phase: residual strains (%) before its first loading and after its last, NaN
-        where the loads are not those of the file's first row.
+        where the loads are not those of the file's first row. Columns are file, phase, ratio,
+        cycles, warp_before_percent, warp_after_percent, warp_load_kN_per_m (of the first row), and
+        the same of the fill.
     tables : sequence of BiaxialTable
         The table of each of these rows.
     """

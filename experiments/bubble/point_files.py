@@ -120,7 +120,11 @@ def _recorded(
     pressures: Sequence[float] | None,
     source: FrameFiles,
 ) -> RecordedFrames | None:
-    """Return the frames chosen by recorded pressures; None if a list has one for each file."""
+    """Return the frames chosen by their pressures; None if all files are taken as listed.
+
+    Frames are chosen where pressures are recorded, or where a list covers several inflations. A
+    forward analysis that lists its pressures needs no recorded ones.
+    """
     place = source.place
     listed = list(pressures or ()) if points.pressure is None else []
     has_inflations = bool(listed) and (section.inflation != 1 or listed != sorted(listed))

@@ -283,7 +283,7 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
         for name in chosen
         if name.startswith(("E_", "nu_", "A_"))
     }
-    alternatives = pd.DataFrame([chosen, *map(row_of, evaluation.alternatives)])
+    choices = pd.DataFrame([chosen, *map(row_of, evaluation.alternatives)])
     ends = [
         None if of_cycle is None else row_of(of_cycle)
         for of_cycle in (evaluation.first_cycle, evaluation.last_cycle)
@@ -293,8 +293,8 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
             words,
             "kN/m" if key.endswith("_m") else "–",
             chosen[key],
-            alternatives[key].min(),
-            alternatives[key].max(),
+            choices[key].min(),
+            choices[key].max(),
             *(end and end[key] for end in ends),
         ]
         for key, words in named.items()
