@@ -331,18 +331,14 @@ def _labels(
         raise InputError(cells.path, f"line {table.header}", problem)
     unit = " deg" if re.search(r"deg|°", direction_column) else ""
     series = [cell + unit for cell in cells.text(direction_column)] if direction_column else []
-    specimens = list(cells.text(specimen_column)) if specimen_column else series
+    specimens = table.specimens(specimen_column) if specimen_column else series
     labels = []
     for row, line in enumerate(cells.lines):
         direction = str(selected)
         if series:
             field = f"line {line}, column {direction_column!r}"
             direction = direction_named(series[row], cells.path, field)
-        specimen = specimens[row] if specimens else cells.path.stem
-        if not specimen:
-            field = f"line {line}, column {specimen_column!r}"
-            raise InputError(cells.path, field, "expected the specimen's name, found nothing")
-        labels.append((direction, specimen))
+        labels.append((direction, specimens[row] if specimens else cells.path.stem))
     return labels
 
 

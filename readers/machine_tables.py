@@ -109,6 +109,16 @@ class MachineTable:
         """Return an error about a column."""
         return InputError(self.table.path, f"line {self.header}, column {column!r}", problem)
 
+    def specimens(self, column: str) -> list[str]:
+        """Return the specimen's name in each row; InputError where a cell has none."""
+        names = list(self.table.text(column))
+        for line, name in zip(self.table.lines, names, strict=True):
+            if not name:
+                field = f"line {line}, column {column!r}"
+                problem = "expected the specimen's name, found nothing"
+                raise InputError(self.table.path, field, problem)
+        return names
+
     def column(self, quantity: str) -> str:
         """Return the name of the column of a quantity.
 

@@ -89,11 +89,12 @@ def read_readings(section: BubbleSection, place: Place) -> GaugeReadings | None:
 def _check_nuisance(section: BubbleSection, place: Place) -> None:
     """Refuse keys that need fields of a camera beside readings, and those of readings elsewhere."""
     nuisance = section.nuisance
-    if not section.data.has_readings:
+    if section.data.heights is None and section.data.profiles is None:
         for key in ("height_offset", "height_scale"):
             if getattr(nuisance, key) is not None:
                 problem = "is of gauges: there is no [bubble.data.heights]"
                 raise place.error(f"nuisance.{key}", problem)
+    if not section.data.has_readings:
         return
     keys_of_fields = {
         "inflation": section.inflation == "all",
@@ -144,13 +145,15 @@ def _profiles(
     if not tables:
         return []
     points = pd.concat(_with_pressures(tables, place, pressures))
+    specimens = pd.factorize(points["specimen"])[0] if "specimen" in points else 0
+    points = points.assign(specimen=specimens)
     points = points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
     if "axis" not in points:
         points = points.assign(axis=str(section.direction_deg))
     series = []
     for axis, line in points.groupby("axis", sort=False):
         angle = np.radians(_direction_of_line(str(axis).lower(), place))
-        profiles = [_thinned(profile) for _, profile in line.groupby("pressure")]
+        profiles = [_thinned(profile) for _, profile in line.groupby(["pressure", "specimen"])]
         table = pd.concat(profiles)
         positions = np.outer(table["coordinate"], [np.cos(angle), np.sin(angle)])
         heights = _series("height", f"heights along {axis}", table, "height", positions)
@@ -162,7 +165,7 @@ def _with_pressures(
     tables: Sequence[pd.DataFrame], place: Place, pressures: Sequence[float] | None
 ) -> Sequence[pd.DataFrame]:
     """Return tables of profiles with a column of pressures (MPa), one a table if they have none."""
-    for column in ("pressure", "axis"):
+    for column in ("pressure", "axis", "specimen"):
         if len({column in table for table in tables}) > 1:
             problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
             raise place.error("data.profiles.files", f"{problem} or in none")
@@ -265,8 +268,9 @@ def _typed_table(
 ) -> pd.DataFrame:
     """Return the table of values in the project; its `height` may be a list for each place."""
     if "height 1" in quantities:
-        heights = np.atleast_2d(np.array(values.pop("height"), dtype=float))
-        values |= {f"height {number + 1}": column for number, column in enumerate(heights)}
+        heights = values.pop("height")
+        columns = heights if heights and isinstance(heights[0], list) else [heights]
+        values |= {f"height {number + 1}": column for number, column in enumerate(columns)}
     sizes = {len(column) for column in values.values()}
     if len(sizes) > 1 or not {*quantities} <= {*values} or len(values) > len(quantities) + 2:
         problem = f"expected lists of equal length: {', '.join(quantities)}"
@@ -312,7 +316,10 @@ def _read_table(
     contents: dict[str, Any] = {}
     stated = {}
     for name, column in headings.items():
-        if name in ("axis", "specimen"):
+        if name == "specimen":
+            contents[name] = table.specimens(column)
+            continue
+        if name == "axis":
             contents[name] = table.table.text(column).to_numpy()
             continue
         units, unit_key = CHANNELS[name.partition(" ")[0].partition("_")[0]]
@@ -349,7 +356,7 @@ def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
         labels = table["specimen"] if "specimen" in table else np.zeros(len(table))
         for _, specimen in table.groupby(labels, sort=False):
             rows = loading_rows(specimen["pressure"].to_numpy(float), inflation)
-            loading = specimen.iloc[rows].drop(columns="specimen", errors="ignore")
+            loading = specimen.iloc[rows].drop(columns=["specimen", "axis"], errors="ignore")
             count = len(rows)
             group = np.arange(count) * min(count, LIMITS.max_readings) // max(count, 1)
             # The height is about linear in the root: means of both lie on the curve.
@@ -396,12 +403,11 @@ def _series(
     positions : (n, 2) array, mm
         Where the readings were taken.
     """
-    specimens = table["specimen"] if "specimen" in table else np.zeros(len(table))
     return ReadingSeries(
         quantity,
         label,
         table["pressure"].to_numpy(float),
         table[column].to_numpy(float),
         positions,
-        np.asarray(specimens, dtype=np.intp),
+        table["specimen"].to_numpy(np.intp),
     )

@@ -71,6 +71,29 @@ def test_workbook_with_two_gauges_and_two_specimens(tmp_path):
     assert half.positions[0].tolist() == [50.0, 0.0]
 
 
+def test_specimen_named_in_its_first_row_only_is_refused(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["specimen", "pressure (kPa)", "height (mm)"])
+    for specimen in ("A", "B"):
+        for p, h in zip(KILO, RISE, strict=True):
+            book.active.append([specimen if p == KILO[0] else None, p, h])
+    book.save(tmp_path / "h.xlsx")
+    words = "line 3, column 'specimen': expected the specimen's name, found nothing"
+    assert words in refusal(tmp_path, HEIGHTS + 'files = ["h.xlsx"]\n')
+
+
+def test_column_of_words_on_the_line_is_no_reading(tmp_path):
+    rows = [f"dome {p:g},{p},{h}" for p, h in zip(KILO, RISE, strict=True)]
+    for heading in ("Line", "Axis", "Achse"):
+        (tmp_path / "h.csv").write_text(f"{heading},p (kPa),z (mm)\n" + "\n".join(rows))
+        (series,) = bubble_of(tmp_path, HEIGHTS + 'files = ["h.csv"]\n').data.series
+        np.testing.assert_allclose(series.value, RISE)
+    (tmp_path / "h.csv").write_text("Line,p (kPa),e (%)\n" + "\n".join(rows))
+    keys = 'files = ["h.csv"]\ncolumns = { strain_warp = "e (%)" }\n'
+    (strain,) = bubble_of(tmp_path, PROJECT + "[bubble.data.apex]\n" + keys).data.series
+    np.testing.assert_allclose(strain.value, RISE / 100)
+
+
 def test_numbers_may_stand_in_the_project(tmp_path):
     keys = "[bubble.data.heights.values]\npressure = [10, 40, 120, 250]\n"
     test = bubble_of(tmp_path, HEIGHTS + keys + "height = [9.6, 15.3, 22.4, 29.1]\n")
@@ -136,6 +159,21 @@ def test_offset_of_gauges_needs_gauges(tmp_path):
     assert "there is no [bubble.data.heights]" in refusal(tmp_path, text)
 
 
+@pytest.mark.parametrize("key", ["height_offset", "height_scale"])
+def test_unknowns_of_heights_need_heights_or_profiles(tmp_path, key):
+    apex = "[bubble.data.apex.values]\npressure = [10, 40]\ncurvature_warp = [1e-3, 2e-3]\n"
+    text = PROJECT + apex + f"[bubble.nuisance]\n{key} = 0.1\n"
+    assert f"nuisance.{key}: is of gauges" in refusal(tmp_path, text)
+    profiles = "pressure = [10, 10, 10]\ncoordinate = [-50, 0, 50]\nheight = [7, 9, 7]\n"
+    assert bubble_of(tmp_path, f"{text}[bubble.data.profiles.values]\n{profiles}").data.series
+
+
+def test_typed_heights_of_unequal_length_are_refused(tmp_path):
+    values = "places = [[0, 0], [50, 0]]\nvalues = { pressure = [10, 40], height = [[1, 2], [1]] }"
+    words = "data.heights.values: expected lists of equal length: pressure, height 1, height 2"
+    assert words in refusal(tmp_path, f"{HEIGHTS}{values}\n")
+
+
 def test_forward_analysis_needs_no_table_but_pressures(tmp_path):
     text = HEIGHTS + 'files = ["none.csv"]\n'
     with pytest.raises(InputError, match="pressures"):
@@ -171,6 +209,25 @@ def test_profiles_of_a_file_a_pressure_take_the_listed_pressures(tmp_path):
     np.testing.assert_allclose(np.unique(series.pressure), [0.01, 0.04])
     assert not series.positions[:, 0].round(9).any()
     assert "expected one for each of 2" in refusal(tmp_path, PROJECT + keys)
+
+
+def test_profiles_of_named_specimens_are_kept_apart(tmp_path):
+    rows = {
+        name: [f"{name},10,{s},{h * (1 - (s / 100) ** 2)}" for s in range(-90, 91, 3)]
+        for name, h in (("S1", 10.0), ("S2", 11.0))
+    }
+    heading = "Specimen,p (kPa),s (mm),dz (mm)\n"
+    (tmp_path / "p.csv").write_text(heading + "\n".join(rows["S1"] + rows["S2"]))
+    keys = '[bubble.data.profiles]\nfiles = ["p.csv"]\n'
+    (series,) = bubble_of(tmp_path, PROJECT + keys).data.series
+    assert series.specimens.tolist() == [0] * 40 + [1] * 40
+    apex = [series.value[series.specimens == number].max() for number in (0, 1)]
+    np.testing.assert_allclose(apex, [10.0, 11.0], rtol=1e-3)
+    for name, lines in rows.items():
+        (tmp_path / f"{name}.csv").write_text(heading + "\n".join(lines))
+    files = keys.replace('"p.csv"', '"S1.csv", "S2.csv"')
+    (of_files,) = bubble_of(tmp_path, PROJECT + files).data.series
+    assert of_files.specimens.tolist() == series.specimens.tolist()
 
 
 @pytest.mark.parametrize(
@@ -219,7 +276,11 @@ def test_modes_of_the_sheet_are_refused_beside_readings_of_the_apex(tmp_path):
 
 @pytest.mark.parametrize(
     ("heading", "cells", "column"),
-    [("p (kPa),s (mm),dz (mm)", "10,", "pressure"), ("axis,s (mm),dz (mm)", "x,", "axis")],
+    [
+        ("p (kPa),s (mm),dz (mm)", "10,", "pressure"),
+        ("axis,s (mm),dz (mm)", "x,", "axis"),
+        ("specimen,s (mm),dz (mm)", "A,", "specimen"),
+    ],
 )
 def test_column_that_only_some_profiles_have_is_refused(tmp_path, heading, cells, column):
     places = range(-90, 91, 10)
