@@ -413,7 +413,10 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
 
 
 def _deflections(section: BentSection) -> tuple[float, ...]:
-    """Return the deflection (mm) of each frame of a section in base units."""
+    """Return the deflection (mm) of each frame of a section in base units.
+
+    Listed deflections count before an end and a number of frames, which may be of the defaults.
+    """
     if section.deflections is not None:
         return tuple(section.deflections)
     end = section.deflection or DEFAULTS.deflection
@@ -477,7 +480,7 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
         raise place.error("pressure", f"{pressure:g} lies outside wall.pressure, {ends}")
     is_braid = section.yarn is not None
     keys = BRAID_KEYS if is_braid else PLAIN_KEYS
-    foreign_keys = (*PLAIN_KEYS, "poisson") if is_braid else (*BRAID_KEYS, "across")
+    foreign_keys = (*PLAIN_KEYS, "poisson", "wrinkles") if is_braid else (*BRAID_KEYS, "across")
     _check_wall_keys(section, keys, foreign_keys, place)
     optional = "across" if is_braid else "poisson"
     values = {
@@ -499,7 +502,7 @@ def _check_wall_keys(
 ) -> None:
     """Raise InputError unless a wall has all keys of its kind, and none of the other kind."""
     missing = [key for key in keys if getattr(section, key) is None]
-    misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
+    misplaced = [key for key in foreign_keys if key in section.model_fields_set]
     if misplaced:
         kind = "a plain wall" if "yarn" in keys else "a braid"
         raise place.error(f"wall.{misplaced[0]}", f"is of {kind}, and {keys[0]} of another kind")

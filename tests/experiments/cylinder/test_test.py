@@ -125,6 +125,12 @@ def test_mistake_in_a_cylinder_section_is_one_line(tmp_path, old, new, words):
         ("angle = 65.0,", "", "cylinder[0].wall.angle", "braid"),
         ("angle = 65.0", "angle = 50.0", "cylinder[0].wall.angle", "54.7"),
         ("angle = 65.0", "angle = 65.0, poisson = 0.4", "cylinder[0].wall.poisson", "a plain wall"),
+        (
+            "angle = 65.0",
+            "angle = 65.0, wrinkles = false",
+            "cylinder[0].wall.wrinkles",
+            "a plain wall",
+        ),
         ("stiffness = 8e5", "", "cylinder[0].cord[1]", "stiffness"),
         (
             "stiffness = 8e5",
