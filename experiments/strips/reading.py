@@ -149,10 +149,12 @@ def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile
         patterns = data.files.model_dump(exclude_none=True)
     if data.directions is not None:
         at = "data.directions"
-        patterns = {
-            direction_named(f"{angle} deg", place.path, f"{place.at}.{at}"): names
-            for angle, names in data.directions.items()
-        }
+        patterns = {}
+        for angle, files in data.directions.items():
+            direction = direction_named(f"{angle} deg", place.path, f"{place.at}.{at}")
+            if direction in patterns:
+                raise place.error(f"{at}.{angle}", f"{direction} is listed twice; join the lists")
+            patterns[direction] = files
     if not patterns:
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
         raise place.error(at, problem)

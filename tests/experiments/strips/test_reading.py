@@ -394,6 +394,8 @@ def test_wrong_angles_name_the_key(tmp_path):
         ["strips[0].data.directions", "'105 deg'"], fan_of_strips, tmp_path, ("75 =", "105 =")
     )
     complaint_with(["fan.csv", "no bias", "75 degrees"], fan_of_strips, tmp_path, ("75 =", "45 ="))
+    twice = ("75 =", '"30.0" =')
+    complaint_with(["data.directions.30.0", "30 degrees", "twice"], fan_of_strips, tmp_path, twice)
     listed = ("gauge_length = 20.0", ""), ("[data]", "[warp]\ngauge_length = 20\n[data]")
     complaint_with(["strips[0].bias.gauge_length", "missing"], fan_of_strips, tmp_path, *listed)
 
