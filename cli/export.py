@@ -83,7 +83,9 @@ def _export_paths(card: Path, name: str, suffixes: Sequence[str], out: Path | No
     target = Path(default) if out is None else out
     if target.is_dir():
         target = target / default
-    paths = [target, *(target.with_suffix(suffix) for suffix in further)]
+    # ".8" of "pvc-0.8" is no suffix.
+    stem = target.with_suffix("") if target.suffix[1:2].isalpha() else target
+    paths = [target, *(stem.with_name(f"{stem.name}{suffix}") for suffix in further)]
     if len(set(paths)) < len(paths):
         problem = f"{', '.join(further)} is what another file ends in; use {first}"
         raise InputError(None, "--out", f"{target}: {problem}")

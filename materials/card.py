@@ -362,7 +362,7 @@ def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
     comparative = "stiffer" if share > 0 else "softer"
     return (
         f"the card was fitted for a thickness of {card.thickness:g} mm, this is {thickness:g} mm: "
-        f"with the card's moduli the fabric is {100 * abs(share):.2g} % {comparative}"
+        f"with the card's moduli the fabric is {100 * abs(share):.3g} % {comparative}"
     )
 
 

@@ -39,7 +39,7 @@ from .forms.base import (
 )
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
-from .forms.symmetry import modulus_labels
+from .forms.symmetry import at_nu12, modulus_labels
 from .memory import NAMES, PLAIN, Memory
 from .pieces import (
     CauchyGreen,
@@ -75,7 +75,7 @@ class HypoelasticLaw:
         "constant": the thickness stays that at rest, t0, as in shells that keep it;
         "incompressible": it is t0 / area ratio.
     form : LawForm
-        How the coefficients make the moduli.
+        How the coefficients make the moduli; an isotropic one takes the law's Poisson's ratio.
     memory : Memory, optional
         Constants of unloading and reloading (`memory.py`); without them loading, unloading and
         reloading follow the same curve.
@@ -113,10 +113,12 @@ class HypoelasticLaw:
             raise InputError(None, "thickness_change", problem)
         if self.memory is not None and len(crimp_map(self.form)):
             raise InputError(None, "memory", f"a {self.form.name} law has none")
-        pieces = pieces_of(self.form, beta, ends.tolist())
+        form = at_nu12(self.form, self.nu12)
+        pieces = pieces_of(form, beta, ends.tolist())
         beta.flags.writeable = False
         ends.flags.writeable = False
-        for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):
+        values = {"beta": beta, "strain_range": ends, "form": form, "pieces": pieces}
+        for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def _checked_beta(self) -> Array:
@@ -483,8 +485,9 @@ def law_slopes(law: HypoelasticLaw, parameters: Sequence[str], thickness: float)
     ----------
     law : HypoelasticLaw
     parameters : sequence of str
-        "beta_i" (MPa), "nu12", one of `memory.NAMES`, or "thickness" (mm); derivatives by any other
-        are zero. For the thickness they are those of moduli times thickness, over the thickness.
+        "beta_i" (MPa), "nu12" at constant moduli, one of `memory.NAMES`, or "thickness" (mm);
+        derivatives by any other are zero. For the thickness they are those of moduli times
+        thickness, over the thickness.
     thickness : float, mm
         Thickness at rest.
     """

@@ -1,5 +1,6 @@
 """Common parts of all exports: formats and their options, headings, curves, and CSV tables."""
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -37,6 +38,8 @@ CONFIRM = NoteKind("to confirm")
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
 WIDTH = 70
+#: A range that ends before this shear strain is of no shear.
+SHEARED = 1e-3
 #: What the file of a card's band ends in, beside an export.
 BAND_FILE = ".band.csv"
 BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
@@ -190,7 +193,8 @@ def heading(
 
 def title_of(card: MaterialCard, length: int) -> str:
     """Return the card's name in ASCII, cut to a number of characters; "fabric" without one."""
-    return one_line(_ascii(card.name))[:length] or "fabric"
+    # A line that begins with one of these is a comment, or a keyword, of some program.
+    return one_line(_ascii(card.name)).lstrip("#$*/ ")[:length] or "fabric"
 
 
 def _ascii(text: str) -> str:
@@ -232,10 +236,17 @@ def band_table(card: MaterialCard, unit: str) -> str:
 
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
-    """Return a remark if the card has no end of strain in a direction; `reach` is used instead."""
-    if (card.law.strain_range < UNLIMITED).all():
-        return ()
+    """Return remarks if the card has no end of strain in a direction, or holds without shear.
+
+    Without an end `reach` is used instead.
+    """
+    ends = card.law.strain_range
+    unknown = ("shear: nothing that the card was fitted to sheared the fabric",)
+    remarks = unknown if ends[2] < SHEARED else ()
+    if (ends < UNLIMITED).all():
+        return remarks
     return (
+        *remarks,
         "the card has no valid_strain in at least one direction: there the curve ends at "
         f"{100 * reach:g} % of log strain, and the modulus is held beyond",
     )
@@ -251,6 +262,25 @@ class Option:
     exclusive_minimum: float | None = None
     largest: float | None = None
     choices: tuple[str, ...] = ()
+
+    def check(self, value: Any, flag: str) -> None:
+        """Raise InputError for a value that is no choice or beyond a limit; None is not given."""
+        if self.choices:
+            check_one_of(value, self.choices, flag)
+        if value is None or self.kind is str:
+            return
+        limits = (
+            ("a finite number", math.isfinite(value)),
+            (f"{self.smallest} or more", self.smallest is None or value >= self.smallest),
+            (
+                f"more than {self.exclusive_minimum}",
+                self.exclusive_minimum is None or value > self.exclusive_minimum,
+            ),
+            (f"{self.largest} or less", self.largest is None or value <= self.largest),
+        )
+        for limit, is_kept in limits:
+            if not is_kept:
+                raise InputError(None, flag, f"expected {limit}, got {value}")
 
 
 def option(
@@ -381,14 +411,13 @@ class ExportFormat:
         return paths
 
     def check(self, options: Mapping[str, Any]) -> None:
-        """Raise InputError for an option, or a choice of one, that this format does not take."""
+        """Raise InputError for an option, or a value of one, that this format does not take."""
         formal = {entry.name: entry.metadata["option"] for entry in fields(self.options)}
         for name, value in options.items():
             if name not in formal:
                 problem = f"means nothing to the format {self.name}"
                 raise InputError(None, flag_of(name), problem)
-            if formal[name].choices:
-                check_one_of(value, formal[name].choices, flag_of(name))
+            formal[name].check(value, flag_of(name))
 
 
 def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:

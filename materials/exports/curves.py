@@ -23,7 +23,6 @@ from ..card import MaterialCard
 from ..deformation_curves import MEASURES, Measure
 from ..forms.base import Array
 from . import base
-from .designers import SHEARED
 
 #: Crimp that does not count.
 CRIMP = 1e-4
@@ -128,11 +127,7 @@ def _remarks_of_radioss(
     unloads = card.law.memory is not None
     loses = [
         f"nu12 = {card.law.nu12:g}: the crimps S1, S2 that would couple warp and fill are "
-        f"{CRIMP:g}; {curves.uncoupled}"
-    ]
-    if card.law.strain_range[2] < SHEARED:
-        loses.append("shear: nothing that the card was fitted to sheared the fabric")
-    loses += [
+        f"{CRIMP:g}; {curves.uncoupled}",
         f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
         base.FROM_TOP if unloads else base.TOTAL,
         *options.remarks(card),

@@ -13,6 +13,7 @@ from ..card import MaterialCard
 from ..forms.base import UNLIMITED
 from .base import (
     MILLIMETRES,
+    SHEARED,
     Export,
     ExportFormat,
     ExportRemarks,
@@ -24,10 +25,11 @@ from .base import (
 
 #: Shear strain to which G is averaged without a range.
 SHEAR = 0.1
-#: A range that ends before this shear strain is of no shear.
-SHEARED = 1e-3
 #: Constants with a spread.
 YARNS = ("warp", "fill")
+#: Relative difference up to which a load or a strain counts as the end of the card's range.
+ROUNDING = 1e-9
+HELD = "the card does not hold so far, and its moduli stay as at the end of its range"
 BESIDE_VALUES = UnitSystem("as beside each value")
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
@@ -89,6 +91,19 @@ class LinearisedCard:
     shear: float
 
     @property
+    def _beyond_range(self) -> list[str]:
+        """Say which loads and shear lie beyond the card's range of strain."""
+        ends = self.card.law.strain_range
+        beyond = []
+        if (ends[:2] < UNLIMITED).all():
+            largest = _end_of_range(self.card)
+            if self.highest > largest * (1 + ROUNDING):
+                beyond.append(f"loads above {largest:.4g} kN/m: {HELD}")
+        if SHEARED <= ends[2] < self.shear * (1 - ROUNDING):
+            beyond.append(f"shear above {100 * ends[2]:.3g} %: {HELD}")
+        return beyond
+
+    @property
     def remarks(self) -> ExportRemarks:
         """Say what the constants carry and lose of the law."""
         constants = self.evaluated
@@ -116,6 +131,7 @@ class LinearisedCard:
             ),
             loses=(
                 *unknown,
+                *self._beyond_range,
                 f"what is not straight: RMS of strain, by ratio: {losses}; "
                 f"{constants.rms:.3g} % over all",
                 f"over {1 + len(constants.alternatives)} choices of paths, squares and "
@@ -217,6 +233,8 @@ def _sheet(
             raise InputError(None, "--prestress-warp", problem)
         strain = (100 * response.elongation[-1]).tolist()
         carries += ("strain at the prestress: of the law itself, from the unloaded fabric",)
+        if (np.log1p(response.elongation[-1]) > card.law.strain_range[:2]).any():
+            loses += (f"strain at the prestress: {HELD}",)
     if None in kept_strains:
         loses += (
             "compensation: a card knows no strain kept after load cycles; `bubblefit biaxial` "
@@ -317,7 +335,7 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
         "# nu_warp: contraction of the warp when the fill is pulled (nu_xy beside E_x, x the "
         "warp); nu_fill: of the fill when the warp is pulled (nu12 of the card's law)"
     )
-    head = heading(card, "Constants per width", linear.remarks, "#")
+    head = heading(card, "Constants per width", linear.remarks, "#", BESIDE_VALUES)
     return Export({".csv": "\n".join([head, meaning, columns, *rows]) + "\n"}, linear.remarks)
 
 

@@ -9,6 +9,7 @@ make no law that is exactly the same in all directions; with constants it is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -156,6 +157,13 @@ def symmetric(form: LawForm, symmetry: Symmetry, nu12: float) -> LawForm:
         problem = f"a {symmetry} law has the same knots or breaks along warp and fill"
         raise InputError(None, "symmetry", problem)
     return SymmetricForm(form, symmetry, nu12 if is_isotropic else 0.0)
+
+
+def at_nu12(form: LawForm, nu12: float) -> LawForm:
+    """Return a form with another Poisson's ratio, on which G12 of an isotropic law depends."""
+    if not isinstance(form, SymmetricForm) or form.symmetry != "isotropic" or form.nu12 == nu12:
+        return form
+    return replace(form, nu12=nu12)
 
 
 def pooled_strains(

@@ -69,6 +69,8 @@ def test_export_command_overwrites_with_force_only(card_folder):
     run_export(*command[:-1], "cards")
     names = {path.name for path in (card_folder / "cards").iterdir()}
     assert names == {"material-abaqus-umat.f", "material-abaqus-umat.inp"}
+    run_export(*command[:-1], "law-0.8")
+    assert (card_folder / "law-0.8.inp").exists()
     run_export("material.toml", "--format", "calculix", "--out", ".")
     assert (card_folder / "material-calculix.c").exists()
 

@@ -102,7 +102,7 @@ def test_thickness_difference_names_both_and_what_it_means():
     card = MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.8)
     for share in (0.0, 1e-12, 9e-7, -9e-7):
         assert thickness_difference(card, 0.8 * (1 + share)) is None
-    for share, words in ((1.1e-6, "stiffer"), (-0.1, "10 % softer"), (0.25, "25 % stiffer")):
+    for share, words in ((1.1e-6, "stiffer"), (-0.1, "10 % softer"), (3.05, "305 % stiffer")):
         said = thickness_difference(card, 0.8 * (1 + share))
         assert said.endswith(words) and "0.8 mm" in said and f"{0.8 * (1 + share):g} mm" in said
 

@@ -1,6 +1,7 @@
 """materials/exports/base.py: what all exports have: columns, bands, notes of losses, refusals."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -90,6 +91,31 @@ def test_exports_name_what_their_target_loses():
         said = loses(name, unlimited, reach=0.05)
         assert "no valid_strain" in said and "5 % of log strain" in said
         assert "no valid_strain" not in loses(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "value", "expected"),
+    [
+        ("ls-dyna-mat34", "density", np.nan, "a finite number"),
+        ("ls-dyna-mat34", "density", np.inf, "a finite number"),
+        ("abaqus-fabric", "density", 0.0, "more than 0"),
+        ("gsa", "prestress_warp", -5.0, "0 or more"),
+        ("constants", "shear", 1.5, "1 or less"),
+        ("csv", "points", 1, "2 or more"),
+    ],
+)
+def test_values_beyond_the_limits_of_an_option_are_refused(name, option, value, expected):
+    raised = refused(FORMATS[name].export, EXPORTED_CARD, **{option: value})
+    assert raised.field == f"--{option.replace('_', '-')}"
+    assert raised.problem == f"expected {expected}, got {value}"
+
+
+@pytest.mark.parametrize("mark", ["#", "$", "*", "/", "## "])
+@pytest.mark.parametrize("name", ["radioss-law58", "ls-dyna-mat34"])
+def test_title_of_a_deck_is_no_comment(name, mark):
+    card = replace(EXPORTED_CARD, name=f"{mark}1 PVC")
+    lines = next(iter(export(name, card, **few_points(name)).files.values())).splitlines()
+    assert "1 PVC" in lines and f"{mark}1 PVC" not in lines
 
 
 @pytest.mark.parametrize("name", sorted(FORMATS))

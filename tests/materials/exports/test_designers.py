@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.exports.base import UNIT_SYSTEMS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.export_formats import FORMATS
 
@@ -79,11 +80,32 @@ def test_loads_end_at_the_range_of_the_card_by_default():
     complaint_with(["increase"], FORMATS["gsa"].export, BENT_CARD, lowest=5.0, highest=2.0)
 
 
+@pytest.mark.parametrize("name", ["constants", "gsa", "rfem"])
+def test_loads_beyond_the_range_of_the_card_are_noted(name):
+    def loses(**options):
+        return " ".join(text_of(name, BENT_CARD, **options)[1].loses)
+
+    assert "above" not in loses() and "does not hold" not in loses()
+    assert "loads above" in loses(highest=60.0) and "shear above 10 %" in loses(shear=0.4)
+    if name != "constants":
+        loads = {"prestress_warp": 2.0, "prestress_fill": 2.0}
+        assert "strain at the prestress: the card" not in loses(**loads)
+        loads = {"prestress_warp": 60.0, "prestress_fill": 60.0}
+        assert "strain at the prestress: the card does not hold so far" in loses(**loads)
+
+
+@pytest.mark.parametrize("units", UNIT_SYSTEMS)
+def test_heading_of_constants_names_the_units_of_no_other_system(units):
+    text, _ = text_of("constants", BENT_CARD, units=units)
+    assert "# units: as beside each value" in text and "N, MPa" not in text
+
+
 def test_card_without_sheared_data_is_noted():
     blind = MaterialCard(
         HypoelasticLaw(BENT_LAW.beta, 0.24, [0.07, 0.07, 1e-6]), 0.8, "biaxial only"
     )
-    for name in ("constants", "gsa", "rfem", "radioss-law58"):
+    curves = ("csv", "marc", "radioss-law58", "radioss-law158", "ls-dyna-mat34", "abaqus-fabric")
+    for name in ("constants", "gsa", "rfem", *curves):
         for card in (blind, BENT_CARD):
             said = "sheared the fabric" in " ".join(
                 text_of(name, card, **few_points(name))[1].loses

@@ -1,5 +1,7 @@
 """Balanced and isotropic laws: moduli that follow from E, bounds, cards, fits from Python."""
 
+from dataclasses import replace
+
 import bubblefit as bf
 import numpy as np
 import pytest
@@ -39,6 +41,15 @@ def test_isotropic_moduli_follow_from_one(name):
     shear = law.G12((1 + NU12) * STRAIN * (1 - 1e-12))
     np.testing.assert_allclose(2 * (1 + NU12) * shear, law.E1(STRAIN))
     assert modulus_labels(law.form) == {"E1": "E"} and "E2" not in law.moduli_words()
+
+
+def test_other_poissons_ratio_of_an_isotropic_law_changes_its_shear_modulus(tmp_path):
+    law = replace(law_of("constant", "isotropic", [100.0]), nu12=0.1)
+    assert law.G12(0.05) == pytest.approx(100.0 / 2.2)
+    MaterialCard(law, 0.8, "isotropic").write(tmp_path / "card.toml")
+    np.testing.assert_allclose(read_card(tmp_path / "card.toml").law.pieces, law.pieces)
+    balanced = law_of("constant", "balanced", [20.0, 100.0])
+    assert replace(balanced, nu12=0.1).G12(0.05) == balanced.G12(0.05)
 
 
 def test_balanced_law_keeps_its_shear_modulus():
