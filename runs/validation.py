@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import Positive, checked_arguments
 from ..errors import InputError
-from ..experiments.base import Divisible, Masks, Test
+from ..experiments.base import Divisible, Masks, ProgramTest, Test, Weighting
 from ..experiments.registry import kind_named
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
@@ -576,7 +576,7 @@ def judge_cards(
     Raises
     ------
     InputError
-        A card has another thickness, or there is no test to judge it at.
+        A card has another thickness, or no value of a deck's parameter, or there is no test.
     """
     for name, card in cards.items():
         difference = thickness_difference(card, project.fabric.thickness)
@@ -587,14 +587,38 @@ def judge_cards(
     judged = []
     if not predicted or any(kind_named(test.kind).fitted for test in chosen):
         setup = prepare_fit(project, project.chosen(tests, fitted=True))
+        _check_parameters(setup, cards)
         judged = [
-            Judged(name, held_out(prepared, card.law, setup.make_solver))
+            Judged(
+                name,
+                held_out(prepared, card.law, setup.make_solver, parameters={name: card.parameters}),
+            )
             for name, card in cards.items()
             for prepared in setup.tests
         ]
     if predicted:
         judged += _judge_predictions(predict(project, predicted, cards, samples=0))
     return Validation(project, tuple(judged), leave="")
+
+
+def _check_parameters(setup: FitSetup, cards: Mapping[str, MaterialCard]) -> None:
+    """Raise InputError if a card lacks a value of a parameter that a deck of the tests has."""
+    parameters = {
+        nuisance.name
+        for prepared in setup.tests
+        if isinstance(prepared.test, ProgramTest)
+        for comparison in prepared.comparisons(setup.make_solver, Weighting())
+        for nuisance in comparison.nuisance
+        if nuisance.drawn
+    }
+    for name, card in cards.items():
+        missing = sorted(parameters - card.parameters.keys())
+        if missing:
+            problem = (
+                f"{name} has no value of {', '.join(missing)}: give the parameters.toml of a fit, "
+                "or put it beside the card"
+            )
+            raise InputError(setup.project.path, "--card", problem)
 
 
 def _judge_predictions(predictions: Predictions) -> list[Judged]:

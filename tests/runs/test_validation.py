@@ -11,12 +11,15 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.forward import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.project.project import chosen_cards
 from bubblefit.runs import validation
 from bubblefit.runs.result import Fit
+from bubblefit.runs.simulation import simulate_cards
 from bubblefit.runs.validation import fit_without, omittable_parts
 
 from ..builders.biaxial_tests import BENT_LAW, biaxial_project, biaxial_rows, write_biaxial_rows
 from ..builders.closed_forms import LAW
+from ..builders.decks import STRETCHES, TRUE, bar, force
 from ..builders.projects import (
     CONSTANT_BUBBLE,
     STRIP_ELONGATION,
@@ -225,3 +228,25 @@ def test_card_is_judged_without_a_fit(project, tmp_path):
     thick = MaterialCard(LAW, 1.0, "thick")
     with pytest.raises(InputError, match=r"fabric\.thickness: thick: .* 1 mm"):
         validation.judge_cards(project, {"thick": thick})
+
+
+def test_card_of_deck_is_judged_at_its_parameters(tmp_path, monkeypatch):
+    project = bar(tmp_path, monkeypatch)
+    card = tmp_path / "halved.toml"
+    card.write_text("".join(f"[{name}]\nvalue = {value / 2}\n" for name, value in TRUE.items()))
+    command = ("validate", "project.toml", "--card", card, "--out", "judged")
+    in_process(*command, cwd=tmp_path)
+    (row,) = pd.read_csv(tmp_path / "judged" / "validation.csv").to_dict("records")
+    forces = force(STRETCHES, *TRUE.values())
+    rms = np.sqrt(np.mean((forces / 2) ** 2))
+    assert row["foretold_rms"] == pytest.approx(rms, rel=1e-3)
+    assert row["foretold_relative"] == pytest.approx(rms / forces.max(), rel=1e-3)
+    cards = chosen_cards(project, [card])
+    simulated = simulate_cards(project, [*project.tests.values()], cards, tmp_path / "simulated")
+    (error,) = simulated.errors.values()
+    assert row["foretold_relative"] == pytest.approx(error, rel=1e-7)
+    for name in ("C01", "C10"):
+        (judged,) = cards.values()
+        kept = {key: value for key, value in judged.parameters.items() if key != name}
+        with pytest.raises(InputError, match=f"--card: part has no value of {name}"):
+            validation.judge_cards(project, {"part": replace(judged, parameters=kept)})
