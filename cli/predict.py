@@ -122,7 +122,7 @@ def _excess(predictions: Predictions, limit: float) -> str:
     """Return in words which error is above the limit of --fail-above, "" if none is."""
     worst = predictions.worst
     silent = predictions.silent()
-    if worst is not None and worst > limit:
+    if worst is not None and not worst <= limit:
         return f"an RMS error of {worst:.4g} of the largest load is above {limit:g}"
     if silent:
         return f"{predictions.predicted_runs[silent[0]].title} gave nothing to compare"

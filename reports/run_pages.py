@@ -514,7 +514,13 @@ def write_constants(
         title=f"{project.title}: constants of biaxial tests",
         verdicts=[(e.test if has_several else "", e.verdict) for e in evaluations],
         about=about_of(project, record),
-        facts=[("ratios", ", ".join(line.ratio for line in e.lines)) for e in evaluations],
+        facts=[
+            (
+                f"{e.test}: ratios" if has_several else "ratios",
+                ", ".join(line.ratio for line in e.lines),
+            )
+            for e in evaluations
+        ],
         sections=[
             PageSection("The constants", _of_tests(exhibits, lambda e: e.tables)),
             PageSection("Measured beside the constants", _of_tests(exhibits, lambda e: e.parts)),

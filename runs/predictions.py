@@ -49,7 +49,7 @@ from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
-from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
+from .verdict import COMPARE_CURVES, large_errors, largest_error, state_of_predictions
 
 log = logging.getLogger(__name__)
 
@@ -137,7 +137,9 @@ class Predictions(Reported):
         count = len(runs) - len(unfinished)
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
-            sentence += f", with errors of {percent(self.worst)} of the largest measured value"
+            sentence += (
+                f", with errors of at most {percent(self.worst)} of the largest measured value"
+            )
         marks = self._marks_in_words()
         state = state_of_predictions(self.errors, [*marks, *unfinished])
         large = large_errors(self.errors)
@@ -173,7 +175,7 @@ class Predictions(Reported):
     @property
     def worst(self) -> float | None:
         """Return the largest `error` of a prediction; None if none is compared."""
-        return max(self.errors.values(), default=None)
+        return largest_error(self.errors)
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""

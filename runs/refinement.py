@@ -252,7 +252,9 @@ def _model_lines(model: Mapping[str, Any]) -> list[str]:
     lines += [_quantity_words(*item) for item in model["quantities"].items()]
     rms = model.get("rms_N")
     if rms is not None:
-        changes = ", ".join(f"{change:.3g}" for change in rms["to_next_finer"])
+        changes = ", ".join(
+            "none" if np.isnan(change) else f"{change:.3g}" for change in rms["to_next_finer"]
+        )
         order = "" if rms["order"] is None else f", order {rms['order']:.2f}"
         lines.append(f"  RMS of the load to the next finer level: {changes} N{order}")
     return lines
@@ -349,10 +351,15 @@ def rms_changes(levels: Sequence[Level]) -> list[float]:
 
 
 def rms_between(coarse: Curve, fine: Curve) -> float:
-    """Return the RMS difference of curves at the coarse one's x, as far as the fine one goes."""
+    """Return the RMS difference of curves at the coarse one's x, as far as the fine one goes.
+
+    It is NaN where the fine one ends before the first x of the coarse one.
+    """
     x, y = coarse
     fine_x, fine_y = fine
     overlap = x <= fine_x[-1] * (1 + 1e-9)
+    if not overlap.any():
+        return np.nan
     y_of_fine = np.interp(x[overlap], np.append(0.0, fine_x), np.append(0.0, fine_y))
     return float(np.sqrt(np.mean((y[overlap] - y_of_fine) ** 2)))
 

@@ -31,7 +31,7 @@ from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Reported, Store, 
 from .in_use import alone_in_folder
 from .process_pool import Task
 from .progress import Listener, listener, timed
-from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
+from .verdict import COMPARE_CURVES, large_errors, largest_error, state_of_predictions
 
 #: The kind of a note on a run that has no result.
 FAILED = NoteKind("failed")
@@ -289,9 +289,9 @@ class SimulatedTests(Reported):
         errors = self.errors
         large = large_errors(errors)
         marks = [f"an analysis is marked {str(kind)!r}" for kind in marks_of(self.notes)]
-        if errors:
-            worst = percent(max(errors.values()))
-            sentence += f", with errors of at most {worst} of the largest measured value"
+        worst = largest_error(errors)
+        if worst is not None:
+            sentence += f", with errors of at most {percent(worst)} of the largest measured value"
         return Verdict(
             state_of_predictions(errors, [*marks, *self.failures]),
             sentence,

@@ -201,6 +201,11 @@ def state_of_predictions(errors: Mapping[str, float], reasons: Collection[str]) 
     return "usable within limits" if large or reasons else "usable"
 
 
+def largest_error(errors: Mapping[str, float]) -> float | None:
+    """Return the largest error of predictions, NaN if one is no number; None without errors."""
+    return float(np.max([*errors.values()])) if errors else None
+
+
 def large_errors(errors: Mapping[str, float]) -> tuple[str, ...]:
     """Return in words the errors of predictions that are larger than `USABLE`, or no number."""
     return tuple(

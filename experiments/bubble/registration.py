@@ -127,7 +127,7 @@ class RegistrationOptions:
     def __post_init__(self) -> None:
         if self.warp is not None and self.warp_points is not None:
             problem = "expected an angle 'warp' or two points 'warp_points', not both"
-            raise InputError(None, "warp", problem)
+            raise InputError(None, "warp_points", problem)
 
 
 ALL_FOUND = RegistrationOptions()
@@ -347,7 +347,7 @@ def _given_warp(placement: Placement, options: RegistrationOptions) -> float | N
     marks = placement.coordinates(np.array(options.warp_points, dtype=float))
     x, y = (marks[1] - marks[0])[:2]
     if np.hypot(x, y) < 1e-9:
-        raise InputError(None, "warp", "expected two different points along the warp")
+        raise InputError(None, "warp_points", "expected two different points along the warp")
     return line_angle(float(np.degrees(np.arctan2(y, x))))
 
 

@@ -1,6 +1,7 @@
 """`bubblefit biaxial`: usual constants of the last cycles, and the options that choose them."""
 
 import json
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -92,3 +93,14 @@ def test_options_choose_evaluated_cycles(folder, tmp_path):
     one_line(run("--ratio", "1:1", code=2), "two that differ")
     one_line(run("--test", "none", code=2), "none")
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_ratios_of_several_tests_stand_under_their_names(folder, tmp_path):
+    shutil.copy(folder / "test.csv", tmp_path)
+    path = biaxial_project(tmp_path, 'name = "a"')
+    second = '[[biaxial]]\nname = "b"\n[biaxial.data]\nfiles = ["test.csv"]\n'
+    path.write_text(path.read_text() + second)
+    in_process("biaxial", "project.toml", cwd=tmp_path)
+    ratios = "1:1, 2:1, 1:2, 1:0, 0:1"
+    page = read_page_data(tmp_path / "out" / f"{tmp_path.name}-biaxial")
+    assert [tuple(fact) for fact in page.facts] == [("a: ratios", ratios), ("b: ratios", ratios)]

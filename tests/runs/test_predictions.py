@@ -154,7 +154,8 @@ def test_failures_errors_and_notes_are_listed_by_run(tmp_path, seen):
     with pytest.raises(SolverFailure, match="no run ended well: made to fail"):
         predict(done.project, cards=["soft"], jobs=1)
     ((_, verdict),) = found.verdicts
-    assert percent(worst) in verdict.sentence and "2 of 4 runs" in verdict.sentence
+    assert f"with errors of at most {percent(worst)}" in verdict.sentence
+    assert "2 of 4 runs" in verdict.sentence
     assert verdict.state == "usable within limits" and verdict.reasons == done.verdict.reasons
     assert verdict.reasons == (f"1 run is marked {str(SNAP)!r}",)
     shown = dict(found.facts)

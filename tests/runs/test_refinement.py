@@ -86,6 +86,7 @@ EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WI
 END = "load at the end, N"
 
 
+@pytest.mark.filterwarnings("error")
 def test_edge_length_is_root_of_area_per_quad():
     assert refinement.edge_length(strip_mesh(20.0, 40.0, 4, 8)) == pytest.approx(5.0)
     disk = disk_mesh(100.0, 800, "quarter")
@@ -98,6 +99,7 @@ def test_edge_length_is_root_of_area_per_quad():
         0.0, abs=1e-15
     )
     x = np.array([1.0, 2.0, 3.0])
+    assert np.isnan(refinement.rms_between((x, x), (x / 8, x)))
     assert refinement.rms_between((x, 2 * x), (x[:2], 2 * x[:2])) == pytest.approx(0.0, abs=1e-15)
 
 
@@ -279,6 +281,11 @@ def test_numbers_of_study_are_those_of_runs():
     assert told(closer)["rms_N"]["to_next_finer"][0] < 2e-4
     for runs, noise in ((RUNS, 0.0157), (closer, 1e-7), (closer, 1e-3), (farther, 1e-7)):
         assert told(runs, noise)["rms_N"]["order"] == pytest.approx(1.0)
+    stopped = replace(RUNS[2], curve=(X / 4, X))
+    rms = told([*RUNS[:2], stopped])["rms_N"]
+    assert rms["order"] is None and rms["to_next_finer"][1] is None
+    text = "\n".join(study([*RUNS[:2], stopped]).lines())
+    assert f"to the next finer level: {0.2 * ROOT:.3g}, none N" in text
     said = told([RUNS[0], RUNS[3]])
     assert said["quantities"] == {} and "rms_N" not in said and len(said["levels"]) == 2
     assert "rms_N" not in told([replace(r, curve=None) for r in RUNS[:2]])

@@ -42,6 +42,7 @@ from bubblefit.runs.verdict import (
     NOT_CONVERGED,
     USABLE,
     answers,
+    largest_error,
     state_of_predictions,
     usable_ranges,
     verdict_of,
@@ -236,6 +237,12 @@ def test_unknown_sheet_is_not_advised_where_first_shape_is_known(known):
 )
 def test_prediction_is_usable_by_its_error_and_its_marks(errors, reasons, state):
     assert state_of_predictions(dict(enumerate(errors)), reasons) == state
+
+
+def test_error_that_is_no_number_is_the_largest():
+    assert largest_error({}) is None
+    assert largest_error({"a": 0.1, "b": 0.2}) == 0.2
+    assert np.isnan(largest_error({"a": 0.1, "b": np.nan, "c": 0.2}))
 
 
 def simulated(errors, notes=(), failures=None):

@@ -134,13 +134,14 @@ def test_given_plane_centre_and_axes_are_taken():
     assert (said["centre"], said["warp"]) == ("given", "given")
     expected = rotation_about_z(30.0).coordinates(BUBBLE_FRAMES[0].points - (3.0, -2.0, 0.0))
     np.testing.assert_allclose(moved[0].points, expected, atol=1e-9)
-    assert "not both" in complaint(RegistrationOptions, warp=1.0, warp_points=marks)
+    both = complaint(RegistrationOptions, warp=1.0, warp_points=marks)
+    assert "warp_points: expected an angle" in both and "not both" in both
     back = replace(options, warp_points=((1.0, 1.0, 0.0), (0.0, 2.0, 0.0)))
     assert register(BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS), back)[
         1
     ].warp_angle == pytest.approx(-45.0)
     one = replace(options, warp_points=(marks[0], marks[0]))
-    assert "two different points" in complaint(
+    assert "warp_points: expected two different points" in complaint(
         register, BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS), one
     )
 
@@ -344,7 +345,8 @@ def test_changed_registration_is_another_fit(camera_folder):
 @pytest.mark.parametrize(
     ("more", "key"),
     [
-        ("warp = 1.0\nwarp_points = [[0, 0, 0], [1, 0, 0]]", ".warp"),
+        ("warp = 1.0\nwarp_points = [[0, 0, 0], [1, 0, 0]]", ".warp_points"),
+        ("warp_points = [[1, 0, 0], [1, 0, 0]]", ".warp_points"),
         ('plane = "floor"', ".plane"),
         ("warp = 400.0", ".warp"), ("centre = [1.0, 2.0]", ".centre"),
         ("centre = [500.0, 0.0, 600.0]\nplane = 'clamp'", ""),
