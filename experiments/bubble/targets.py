@@ -146,14 +146,21 @@ class FieldTarget:
         -------
         (n, ...) array
         """
-        displacement = frames[number if self.frame is None else self.frame]
-        if self.reference_frame is not None:
-            displacement = displacement - frames[self.reference_frame]
-        at_places = self.at_places(displacement)
+        at_places = self.at_places(self.nodal_displacement(frames, number))
         if self.estimated_places is not None:
             motion = self.at_places(frames[self.reference_frame])[:, :2]
             at_places = at_places - self.estimated_places.growth_by(motion)
         return at_places
+
+    def nodal_displacement(self, frames: Array, number: int) -> Array:
+        """Return the displacements (nodes, ...) of the model's nodes, counted as the target's are.
+
+        Arguments are those of `modelled_displacement`.
+        """
+        displacement = frames[number if self.frame is None else self.frame]
+        if self.reference_frame is not None:
+            displacement = displacement - frames[self.reference_frame]
+        return displacement
 
 
 def at_nodes(

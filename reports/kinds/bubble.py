@@ -311,15 +311,26 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Return charts of modelled (lines) and measured (dots) profiles along both axes."""
-    return bubbles.cut_charts(
-        f"{prepared.test.name} cuts",
-        prepared.test.pressures,
-        fitted.comparisons[0].model.mesh.points,
-        fitted.histories[0].displacement + amounts_of(OFFSETS, fitted.nuisance),
-        [(field.points, field.displacement) for field in prepared.fields],
-        f"{prepared.test.name}: lines are the model, dots are {prepared.source}.",
-    )
+    """Return charts of modelled (lines) and measured (dots) profiles along both axes.
+
+    Displacements count from the reference state, or from the frame of `from_pressure`. Offsets are
+    added to the model; a fitted tilt or shift, and a constant field, are not.
+    """
+    test = prepared.test
+    pressures: Sequence[float] = test.pressures
+    nodes = fitted.comparisons[0].model.mesh.points
+    frames = fitted.histories[0].displacement
+    modelled = [*(frames + amounts_of(OFFSETS, fitted.nuisance))]
+    measured = [(field.points, field.displacement) for field in prepared.fields]
+    caption = f"{test.name}: lines are the model, dots are {prepared.source}"
+    if test.sheet.reference_frame is not None:
+        targets = objective_of(fitted).targets
+        caption += ", both counted from the loaded frame"
+        pressures = [target.pressure for target in targets]
+        modelled = [target.nodal_displacement(frames, k) for k, target in enumerate(targets)]
+        measured = [(t.at_places(nodes[:, :2]), t.displacement) for t in targets]
+    name = f"{test.name} cuts"
+    return bubbles.cut_charts(name, pressures, nodes, modelled, measured, f"{caption}.")
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:

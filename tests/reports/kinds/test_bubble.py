@@ -38,7 +38,7 @@ from ...builders.flat_bubbles import (
     stretched,
 )
 from ...builders.projects import known_bubble_of_form
-from ...support.charts import caught
+from ...support.charts import caught, data
 
 
 def simulated(folder: Path, sheet: object = SheetSettings(), **outcomes: Any) -> Any:
@@ -159,6 +159,21 @@ def test_words_say_why_there_is_no_map_of_strain():
     ]
     loaded = strain_maps(*fitted_bubble(0.0, reference_frame=0))
     assert isinstance(loaded, Words) and "loaded frame" in loaded.lines[0]
+
+
+def test_profiles_count_model_and_data_from_the_loaded_frame():
+    start, end = INFLATED.displacement
+    prepared, fitted = fitted_bubble(0.0, reference_frame=0)
+    prepared.test.pressures, prepared.fields = FINE.pressures, ()
+    sample = scipy.sparse.eye(len(start), format="csr")
+    target = FieldTarget(FINE.pressures[1], end - start, sample, frame=1, reference_frame=0)
+    fitted.comparisons[0].objective = FieldObjective([target], "mm")
+    charts = report.profile_charts(prepared, fitted)
+    assert "both counted from the loaded frame" in charts.caption
+    for chart in charts.charts:
+        modelled, measured = data(chart)
+        assert modelled[1].max() == pytest.approx((end - start)[:, 2].max(), abs=1e-3)
+        np.testing.assert_allclose(measured, modelled, atol=1e-9)
 
 
 def test_series_for_paraview_is_read_back(tmp_path):
