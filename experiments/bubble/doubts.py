@@ -547,7 +547,11 @@ def strain_unlike_rise(view: MeasuredView) -> Iterator[Doubt]:
         return
     low = first if len(view.fields) > 1 else None
     comparison = strain_of_rise(low, last, view.outline)
-    if not comparison.is_comparable or not comparison.is_outside(CONSISTENCY.doubtful):
+    doubtful, impossible = CONSISTENCY.doubtful, CONSISTENCY.impossible
+    if view.counts_from_pressure:
+        # Strains go with the square of the height, which is more than the rise since that pressure.
+        doubtful, impossible = (doubtful[0], np.inf), (impossible[0], np.inf)
+    if not comparison.is_comparable or not comparison.is_outside(doubtful):
         return
     smaller, larger = comparison.principal_strains
     rise, lower = comparison.rise
@@ -557,7 +561,7 @@ def strain_unlike_rise(view: MeasuredView) -> Iterator[Doubt]:
         f"the centre is strained by {smaller:.2g} and {larger:.2g} (principal strains, of dx and "
         f"dy), and {rises} calls for about {due}"
     )
-    is_sure = comparison.is_outside(CONSISTENCY.impossible)
+    is_sure = comparison.is_outside(impossible)
     # Exchanged or flipped columns are named only where the strain is impossible without them.
     name, remedy = _remedy(comparison.assignment) if is_sure else ("strain-rise", "")
     if not remedy:

@@ -67,6 +67,15 @@ def test_limits_of_column_doubts(check, name, count, sure, words, seen):
     assert_doubted(check, count, name, sure, *words, **seen)
 
 
+def test_rise_from_a_loaded_frame_bounds_the_strain_from_below_only():
+    check, seen = doubts.strain_unlike_rise, {"counts_from_pressure": True}
+    assert doubts_said(check, centre_motions=(motion(0.5, 0.5),), **seen) == []
+    few = {"centre_motions": (motion(0.5, 0.0088),)}
+    assert_doubted(check, 1, "strain-rise", True, "a rise of 30 mm", **few, **seen)
+    flipped = {"centre_motions": (motion(-0.5, 0.5),)}
+    assert_doubted(check, 1, "axis-flipped", True, "x and dx have", **flipped, **seen)
+
+
 def test_centre_that_goes_down_is_doubted():
     down = doubts.upside_down
     assert doubts_said(down, rises=np.array([-3.0, 0.0])) == []
