@@ -163,6 +163,8 @@ class BubbleModel:
         distance = np.abs(np.array(self.increments)[self.reported] - pressures)
         if (distance > 1e-9 * pressures).any():
             raise InputError(None, "increments", "must contain every reported pressure")
+        if self.rim_motion is not None and (np.diff(self.increments) < 0).any():
+            raise InputError(None, "rim_motion", "is of pressures that rise, and these fall")
         if not self.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
         if not min(self.slack) > -1:

@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatch
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Self
@@ -148,7 +149,13 @@ class DeckModel:
         """Return the files of the folder that a text, the command or such a file names."""
         files: dict[str, bytes] = {}
         texts = [" ".join([text, *self.command, *self.listed])]
-        paths = [path for path in self.folder.iterdir() if path.suffix != TEMPLATE]
+        # Results of an earlier run must not pass for those of this one.
+        paths = [
+            path
+            for path in self.folder.iterdir()
+            if path.suffix != TEMPLATE
+            and (path.name in self.listed or not fnmatch(path.name, self.reader.result))
+        ]
         while texts:
             words = texts.pop()
             for path in paths:

@@ -138,7 +138,7 @@ class Results:
         digits = DOUBLE_DIGITS if is_binary else TEXT_DIGITS
         for frame in self._frames:
             names = [name for name in frame.fields if re.search(FIELDS[quantity], name, re.I)]
-            if not names or not np.isfinite(frame.fields[names[0]][nodes]).all():
+            if not names or not np.isfinite(frame.fields[names[0]][nodes]).all(axis=0).any():
                 fields = ", ".join(frame.fields) or "none"
                 problem = f"the results hold no {quantity} at these nodes, but the fields: {fields}"
                 raise SolverFailure(f"{problem}; CalculiX writes it for *NODE FILE with U, RF")
@@ -146,14 +146,20 @@ class Results:
             if rows[-1].dtype == np.float32:
                 digits = TEXT_DIGITS
         values = np.array([np.zeros_like(rows[0]), *rows])
-        return values, last_digit(float(np.abs(values).max()), digits)
+        return values, last_digit(float(np.nanmax(np.abs(values))), digits)
 
     def nodes(self, place: str | tuple[float, ...]) -> NDArray[np.intp]:
         """Return the rows (k,) of a set's nodes, or of that nearest to a place; SolverFailure."""
         mesh = self.file.mesh
         if not isinstance(place, str):
+            if not np.isfinite(mesh.points).all():
+                problem = f"{self.name} does not say where nodes are: name a node set"
+                raise SolverFailure(f"{problem}, or take the results of a .frd file")
             return np.array([np.linalg.norm(mesh.points - np.array(place), axis=1).argmin()])
         nodes = np.flatnonzero(np.isin(mesh.numbers, self.sets.get(place.upper(), [])))
+        if not len(nodes) and self.sets.get(place.upper()):
+            problem = f"{self.name} holds no node of the set {place!r}"
+            raise SolverFailure(f"{problem}: let the deck write results of them")
         if not len(nodes):
             names = ", ".join(self.sets) or "none"
             raise SolverFailure(f"there is no node set {place!r}; there are: {names}")
@@ -196,8 +202,8 @@ def _sets_of(texts: Sequence[str], known: Mapping[str, list[int]]) -> dict[str, 
             if name:
                 members = _members(head.upper(), lines, {**known, **sets})
                 sets.setdefault(name[1].upper(), []).extend(members)
-        for marc_name, marc_members in _MARC_SET.findall(text):
-            sets[marc_name.upper()] = _members("", marc_members.splitlines(), {**known, **sets})
+        for marc_name, listed in _MARC_SET.findall(text):
+            sets[marc_name.upper()] = _marc_members(listed.upper(), {**known, **sets})
     return sets
 
 
@@ -205,8 +211,6 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
     """Return the nodes of a set: a list with sets in it, ranges, or the first numbers of nodes."""
     members: list[int] = []
     for line in lines:
-        for first, last in re.findall(r"(\d+) +to +(\d+)", line):
-            members += range(int(first), int(last))
         words = line.replace(",", " ").upper().split()
         numbers = [int(word) for word in words if word.isdigit()]
         if head.startswith("*NODE"):
@@ -216,6 +220,29 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
         members += numbers
         members += [node for word in words for node in sets.get(word, [])]
     return members
+
+
+def _marc_members(listed: str, sets: Mapping[str, list[int]]) -> list[int]:
+    """Return the nodes of a list of Marc in capitals: "1 TO 9 BY 2 AND EDGE EXCEPT 5"."""
+    members: set[int] = set()
+    combine = {"AND": members.update, "EXCEPT": members.difference_update}
+    combine["INTERSECT"] = members.intersection_update
+    operation, *parts = re.split(r"\b(AND|EXCEPT|INTERSECT)\b", f"AND {listed}")[1:]
+    for part in parts:
+        if part in combine:
+            operation = part
+            continue
+        ranges = re.findall(r"(\d+)\s+TO\s+(\d+)(?:\s+BY\s+(\d+))?", part)
+        nodes = [
+            node
+            for first, last, step in ranges
+            for node in range(int(first), int(last) + 1, int(step or 1))
+        ]
+        single = re.sub(r"\d+\s+TO\s+\d+(\s+BY\s+\d+)?", " ", part).replace(",", " ").split()
+        nodes += [int(word) for word in single if word.isdigit()]
+        nodes += [node for word in single for node in sets.get(word, [])]
+        combine[operation](nodes)
+    return sorted(members)
 
 
 class NodalResults(Protocol):
@@ -264,7 +291,7 @@ class Probe:
             return self._column(results)
         nodes = results.nodes(self.place)
         field, digit = results.field(self.quantity, nodes)
-        values = field[:, :, self.component]
+        values = _along(self.component, field, self.quantity)
         if self.quantity == "displacement":
             return results.times, self.scale * values.mean(axis=1), abs(self.scale) * digit
         # Equal forces of a set err alike.
@@ -358,7 +385,10 @@ class FieldReading:
         nodes = results.nodes(self.place)
         field, rounding = results.field("displacement", nodes)
         _check_span(results.times, np.array([time for time, _, _ in self.frames]))
-        nodal = _smooth(results.times, field)
+        nodal = {
+            axis: _smooth(results.times, _along(axis, field, "displacement"))
+            for axis in {axis for _, axis, _ in self.frames}
+        }
         places = results.points[nodes]
         centre = places.mean(axis=0)
         axes = np.linalg.svd(places - centre, full_matrices=False)[2][:2]
@@ -373,7 +403,7 @@ class FieldReading:
             if distance.max() > room:
                 problem = f"measured points lie up to {distance.max():.3g} mm off the set"
                 raise SolverFailure(f"{problem} {self.place!r}: are both in the axes of the deck?")
-            values = nodal(time)[:, axis]
+            values = nodal[axis](time)
             sampled = scipy.interpolate.LinearNDInterpolator(triangles, values)(position)
             parts.append(np.where(np.isnan(sampled), values[node], sampled))
         return np.concatenate(parts), rounding
@@ -381,6 +411,16 @@ class FieldReading:
 
 #: What of a deck's results is compared.
 Reading: TypeAlias = QuantityReading | FieldReading
+
+
+def _along(axis: int, field: Array, quantity: str) -> Array:
+    """Return a component (1 + frames, k) of a field (1 + frames, k, c); SolverFailure without it.
+
+    Components that the results do not hold are no numbers.
+    """
+    if axis >= field.shape[2] or not np.isfinite(field[:, :, axis]).all():
+        raise SolverFailure(f"the results hold no {quantity} along {'xyz'[axis]} at these nodes")
+    return field[:, :, axis]
 
 
 def _check_span(results: Array, measured: Array) -> None:
@@ -517,12 +557,23 @@ def _nodal_variables(variables: Any) -> dict[str, np.ndarray]:
 
 
 def _vectors(scalars: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the fields (steps, nodes, c): components of a vector are one field."""
-    components: dict[str, list[str]] = {}
-    for name in sorted(scalars, key=str.lower):
+    """Return the fields (steps, nodes, c): components of a vector are one field.
+
+    A component that is missing is no number.
+    """
+    components: dict[str, dict[int, str]] = {}
+    for name in scalars:
         component = _COMPONENT.fullmatch(name)
-        components.setdefault(component[1] if component else name, []).append(name)
-    return {
-        stem if len(names) > 1 else names[0]: np.stack([scalars[name] for name in names], axis=-1)
-        for stem, names in components.items()
-    }
+        stem, axis = (component[1], "xyz".index(component[2].lower())) if component else (name, 0)
+        components.setdefault(stem, {})[axis] = name
+    fields = {}
+    for stem, names in components.items():
+        (first, *others) = names.values()
+        if not others and not first.startswith(f"{stem}_"):
+            fields[first] = scalars[first][..., None]
+            continue
+        values = scalars[first]
+        fields[stem] = np.full((*values.shape, max(names) + 1), np.nan, values.dtype)
+        for axis, name in names.items():
+            fields[stem][..., axis] = scalars[name]
+    return fields

@@ -278,9 +278,11 @@ class PrintedFile:
     """
 
     def __init__(self, path: Path) -> None:
+        # Fortran leaves out the E of an exponent of three digits: 1.000000-120.
+        text = re.sub(r"(?<=\d)([+-]\d{3})\b", r"E\1", path.read_text(encoding="latin-1"))
         tables = [
             (float(time), quantity, np.array([row.split() for row in rows.splitlines()], float))
-            for quantity, time, rows in _TABLE.findall(path.read_text(encoding="latin-1"))
+            for quantity, time, rows in _TABLE.findall(text)
         ]
         nodes = [np.empty(0), *(table[:, 0] for _, _, table in tables)]
         numbers = np.unique(np.concatenate(nodes)).astype(int)

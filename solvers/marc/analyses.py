@@ -205,7 +205,7 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
 
 
 def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
-    """Return the nodal vectors by name at each whole time; InputError for a damaged file.
+    """Return the nodal vectors by name nearest to each whole time; InputError for a damaged file.
 
     The decks end load k at time k, so whole times are the loads. Other frames, and those without
     three displacements, are left out; `whole_times` reports what is then missing.
@@ -223,15 +223,17 @@ def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int
     if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
     frames: dict[int, dict[str, Array]] = {}
+    distances: dict[int, float] = {}
     for frame in file.frames(is_complete):
         time = round(frame.time)
         displacement = frame.fields.get(DISPLACEMENT)
         if (
-            abs(frame.time - time) < NEAR_TIME
+            abs(frame.time - time) <= distances.get(time, NEAR_TIME)
             and displacement is not None
             and displacement.shape[1] >= 3
         ):
             frames[time] = frame.fields
+            distances[time] = abs(frame.time - time)
     return frames
 
 

@@ -213,7 +213,11 @@ def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> lis
         File with the source of the user subroutine, or None.
     """
     older = settings.options == "older"
-    words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
+    # Jobs run in folders of their own.
+    program = settings.executable
+    if os.sep in program:
+        program = os.path.abspath(os.path.expanduser(program))
+    words = [program, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
     if older:
         words += ["-nprocd", str(settings.processors)]
         if settings.threads > 1:

@@ -36,3 +36,7 @@ def test_parameters_and_modes_of_the_sheet():
 
 def test_bad_sheet_is_refused():
     raised(InputError, "slack: expected shares above -1", replace, FLAT, slack=(-1.0, 0.0))
+    levels = (0.01, 0.02, 0.01)
+    motion = np.zeros((3, len(MESH.node_sets["rim"]), 3))
+    falling = {"pressures": levels, "increments": levels, "unloaded": True, "rim_motion": motion}
+    raised(InputError, "rim_motion: is of pressures that rise", replace, FLAT, **falling)

@@ -1,5 +1,7 @@
 """experiments/deck/model.py: filled decks, and conditions evaluated in the sandbox."""
 
+from dataclasses import replace
+
 import pytest
 from bubblefit.experiments.deck.model import holds, linear_conditions
 from bubblefit.materials.law import HypoelasticLaw
@@ -30,6 +32,20 @@ def test_deck_has_the_files_that_it_names_and_no_others(tmp_path):
     mark = model.mark
     (tmp_path / "cube.inp").write_text("*NODE\n")
     assert model.mark != mark
+
+
+def test_results_of_an_earlier_run_are_not_put_into_a_run(tmp_path):
+    write_curve(tmp_path / "frame.csv")
+    path = cube_project(tmp_path)
+    model = read_project(path).tests["cube"].model
+    template = tmp_path / model.template
+    template.write_text(f"** writes old.csv, see cube.inp\n{template.read_text()}")
+    (tmp_path / "old.csv").write_text("x,y\n0,0\n")
+    assert "old.csv" in model.deck(LAW).files
+    for name, listed in (("old.csv", ()), ("o*.csv", ()), ("old.csv", ("old.csv",))):
+        reader = replace(model.reader, result=name)
+        files = replace(model, reader=reader, listed=listed).deck(LAW).files
+        assert ("old.csv" in files) == bool(listed) and "cube.inp" in files
 
 
 def test_condition_refuses_parameters(tmp_path, monkeypatch):

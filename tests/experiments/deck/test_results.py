@@ -11,6 +11,8 @@ from bubblefit.experiments.deck.results import (
     ExodusFile,
     Probe,
     QuantityReading,
+    Results,
+    _vectors,
     deck_sets,
     last_digit,
 )
@@ -56,6 +58,21 @@ def test_sets_of_a_deck_are_read_by_name(tmp_path):
     sets = deck_sets(tmp_path)
     assert {*sets.pop("EDGE")} == {1, 5, 6, 7, 9}
     assert sets == {"ALL": [1, 2], "GRIP": [3, 6, 9], "BOTH": [20, 3, 6, 9]}
+
+
+@pytest.mark.parametrize(
+    ("listed", "members"),
+    [
+        ("1 to 9 by 2", [1, 3, 5, 7, 9]),
+        ("1 to 8 except bottom", [5, 6, 7, 8]),
+        ("1 to 8 except bottom and 2, 3", [2, 3, 5, 6, 7, 8]),
+        ("bottom intersect 3 to 12 c\n and 20", [3, 4, 20]),
+    ],
+)
+def test_lists_of_marc_have_steps_and_exceptions(tmp_path, listed, members):
+    sets = f"define node set bottom\n 1 to 4\ndefine node set grip\n {listed}\n"
+    (tmp_path / "job.dat").write_text(sets)
+    assert deck_sets(tmp_path)["GRIP"] == members
 
 
 def test_sets_in_several_blocks_and_of_later_sets_are_whole(tmp_path):
@@ -194,6 +211,38 @@ def test_all_steps_vectors_and_sets_are_read(tmp_path, layout, file_format):
     assert [frame.time for frame in frames] == TIMES.tolist()
     assert sorted(frames[-1].fields) == ["disp", "flux", "reaction"]
     assert frames[-1].fields["disp"].tolist() == [[0, 0], [0, 0], [0, 4]]
+
+
+def test_components_of_a_vector_keep_their_axes():
+    scalars = {f"react_{axis}": np.full((2, 3), k) for axis, k in (("z", 3.0), ("y", 2.0))}
+    react = _vectors(scalars)["react"]
+    assert np.isnan(react[..., 0]).all()
+    assert (react[..., 1] == 2.0).all() and (react[..., 2] == 3.0).all()
+    assert _vectors({"react_y": np.ones((2, 3), np.float32)})["react"].dtype == np.float32
+    assert _vectors({"flux": np.ones((2, 3))})["flux"].shape == (2, 3, 1)
+
+
+def test_component_that_results_do_not_hold_is_named(tmp_path):
+    exodus(tmp_path / "out.e", "separate")
+    for probe in (Probe("displacement", "fixed", 2), Probe("reaction", (0, 0, 0), 2)):
+        reading = QuantityReading(Probe("time"), probe, np.ones(1))
+        words = f"the results hold no {probe.quantity} along z"
+        raised(SolverFailure, words, DeckReader((reading,), "out.e").read, tmp_path)
+
+
+def test_printed_results_have_no_places_of_nodes(tmp_path):
+    (tmp_path / "job.inp").write_text("*NSET, NSET=SIDE\n3\n")
+    (tmp_path / "job.dat").write_text(
+        " displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
+        "         1  0.000000E+00  0.000000E+00  0.000000E+00\n"
+        "         2  5.000000E+00  0.000000E+00  0.000000E+00\n"
+    )
+    for place, words in (
+        ((10.0, 0.0, 0.0), "job.dat does not say where nodes are: name a node set"),
+        ("side", "job.dat holds no node of the set 'side'"),
+        ("top", "there is no node set 'top'; there are: SIDE"),
+    ):
+        raised(SolverFailure, words, Results(tmp_path, "job.dat").nodes, place)
 
 
 @pytest.mark.parametrize(("precision", "digit"), [("f8", 1e-14), ("f4", 1e-5)])

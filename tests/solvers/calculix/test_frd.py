@@ -95,7 +95,7 @@ TEXT = """
 
  displacements (vx,vy,vz) for set ALL and time  0.5000000E+00
 
-         2  0.000000E+00  0.000000E+00  1.000000E-01
+         2  0.000000E+00  1.000000-120  1.000000E-01
          5  0.000000E+00  0.000000E+00  2.000000E-01
 
  total force (fx,fy,fz) for set GRIP and time  0.5000000E+00
@@ -116,6 +116,7 @@ def test_tables_of_sets_are_read_by_time(tmp_path):
     assert (half.time, full.time) == (0.5, 1.0)
     assert half.fields["forces"][1:, 2].tolist() == [-3.0, 4.0]
     assert half.fields["displacements"][:2, 2].tolist() == [0.1, 0.2]
+    assert half.fields["displacements"][0, 1] == 1e-120
     assert np.isnan(half.fields["forces"][0]).all() and [*full.fields] == ["forces"]
 
 

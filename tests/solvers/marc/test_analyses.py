@@ -11,17 +11,21 @@ from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.export_formats import FORMATS
+from bubblefit.solvers.marc import analyses
 from bubblefit.solvers.marc.analyses import (
     ABOVE,
+    DISPLACEMENT,
     WAITING_DEPTH,
     analyse_bubble,
     bubble_deck,
     contact_bodies,
     cylinder_deck,
+    frames_by_time,
     strip_deck,
     touching,
 )
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.result_files import ResultFrame, ResultMesh
 
 from ...builders.fortran import LAWS
 from ...marc_stand_in.laws import compiled, law_of_subroutine, law_of_tables
@@ -277,3 +281,20 @@ def test_law_is_equal_in_tables_and_subroutine(read_by_stand_in, tmp_path, name)
                 strain = strain[strain < 0.3]
             wanted = law.modulus(modulus, strain)
             np.testing.assert_allclose(other.modulus(modulus, strain), wanted, rtol=1e-8)
+
+
+def test_frame_nearest_to_a_load_counts(monkeypatch, tmp_path):
+    mesh = disk_mesh(10.0, 16)
+    still = np.zeros((len(mesh.points), 3))
+    times = (0.99, 0.995, 1.0, 1.005, 1.5, 1.995, 2.0)
+
+    class File:
+        def __init__(self, path):
+            self.mesh = ResultMesh(np.arange(1, len(still) + 1), mesh.points, ())
+
+        def frames(self, is_complete):
+            return [ResultFrame(t, fields={DISPLACEMENT: still + t}) for t in times]
+
+    monkeypatch.setattr(analyses, "T19File", File)
+    frames = frames_by_time(tmp_path / "job.t19", mesh)
+    assert {time: frame[DISPLACEMENT][0, 0] for time, frame in frames.items()} == {1: 1.0, 2: 2.0}

@@ -13,7 +13,14 @@ from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.bars import BARS, TOLERANCE
 from bubblefit.solvers.marc import solver as proof
 from bubblefit.solvers.marc.analyses import touching
-from bubblefit.solvers.marc.solver import MarcSolver, exit_number, increments, repeated
+from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.solver import (
+    MarcSolver,
+    exit_number,
+    increments,
+    repeated,
+    run_command,
+)
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import diagnose
 from hypothesis import HealthCheck, given, settings
@@ -318,3 +325,15 @@ def test_garbage_has_no_status(tmp_path, data):
     path.write_bytes(data)
     increments(path)
     exit_number(path)
+
+
+def test_program_of_a_relative_path_is_started_from_the_folder_of_a_run(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for executable, program in (
+        ("bin/run_marc", tmp_path / "bin/run_marc"),
+        ("~/run_marc", tmp_path / "home/run_marc"),
+        ("run_marc", "run_marc"),
+    ):
+        command = run_command(MarcSettings(executable=executable), "job", None)
+        assert command[0] == str(program)
