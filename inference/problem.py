@@ -549,7 +549,13 @@ class WeightedProblem(FitProblem):
             Factor of each residual.
         """
         comparisons = tuple(replace(comparison) for comparison in problem.comparisons)
-        return cls(comparisons, problem.law, problem.unknowns, factors=factors)
+        weighted = cls(comparisons, problem.law, problem.unknowns, factors=factors)
+        # What is minimised of a block is then multiplied by its factor on both sides of its least.
+        blocks = problem.blocks
+        of_blocks = blocks.norms(factors) / np.sqrt(blocks.sizes)
+        of_blocks[of_blocks == 0] = 1.0
+        weighted.blocks = Blocks(blocks.sizes, of_blocks * blocks.least_norms)
+        return weighted
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run every comparison as `FitProblem.evaluate` at y (unknowns,), and weight the result."""

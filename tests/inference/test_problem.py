@@ -1,12 +1,15 @@
 """inference/problem.py: residuals and derivatives of a fit of one or several comparisons."""
 
+import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.objective import Blocks
+from bubblefit.inference.problem import FitProblem, WeightedProblem
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.processes import may_run_at_once
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ..builders.projects import fit_setup
 from ..support.refusals import complaint
 from .cases import (
     BUBBLE_OF_80_MM,
@@ -120,3 +123,67 @@ def test_jacobian_with_shared_nu12_and_thickness_against_differences():
     assert point.residual[-1] == pytest.approx(1e-3 * 0.03 / 0.02)
     assert point.jacobian[fit.rows(1), 12:14].any(axis=0).all()
     assert not point.jacobian[fit.rows(1), 14:].any()
+
+
+def gauges_and_strips(**weights):
+    """A project of heights of a bubble and of stiffer strips, with weights of the strips."""
+    heights = np.array([9.6, 12.1, 13.8, 15.2, 16.3, 17.4, 18.3])
+    bubble = bf.Bubble.heights(
+        np.linspace(0.01, 0.07, 7),
+        [heights, 0.757 * heights, 0.776 * heights],
+        places=[[0, 0], [50, 0], [0, 50]],
+        radius=100.0,
+        symmetry="quarter",
+        elements=27,
+    )
+    strain = np.linspace(0.002, 0.03, 15)
+    error = 5 * np.cos(np.arange(15))
+    curves = {
+        name: [(100 * np.expm1(strain), 20 * modulus * strain + error)]
+        for name, modulus in (("warp", 900.0), ("fill", 250.0))
+    }
+    strips = bf.Strips(
+        curves, width=25.0, gauge=100.0, increments=8, match="points", noise=5.0, **weights
+    )
+    law = bf.Law("constant", bounds={"E1": [20, 3000], "E2": [20, 3000], "G12": [1, 300]})
+    return bf.Project.of([bubble, strips], law, fabric=bf.Fabric("made", thickness=0.8))
+
+
+def merit_by_block(problem, residual):
+    """Contribution of each block to what a fit minimises."""
+    blocks = problem.blocks
+    return np.array([
+        Blocks([size], blocks.least_norms[[k]]).merit(residual[blocks.block_of == k])
+        for k, size in enumerate(blocks.sizes)
+    ])  # fmt: skip
+
+
+def residuals_about_least_norms(problem):
+    """Residuals whose norms are a third, and three times, of the least ones of their blocks."""
+    random = np.random.default_rng(3)
+    values = random.standard_normal(len(problem.scale))
+    relative = problem.blocks.least_norms / problem.blocks.norms(values)
+    return [share * relative[problem.blocks.block_of] * values for share in (1 / 3, 3.0)]
+
+
+def test_block_counts_as_often_as_it_was_drawn_on_both_sides_of_its_least_norm():
+    problem = fit_setup(gauges_and_strips()).problem()
+    assert (problem.blocks.least_norms > 0).all()
+    is_first = problem.blocks.block_of == 0
+    for count in (0, 1, 2, 3):
+        factors = np.where(is_first, float(count), 1.0)
+        drawn = WeightedProblem.of(problem, factors)
+        for residual in residuals_about_least_norms(problem):
+            expected = merit_by_block(problem, residual)
+            expected[0] *= count
+            found = merit_by_block(drawn, factors * residual)
+            found[0] -= 0.5 * drawn.blocks.least_norms[0] * (count == 0)  # a constant
+            np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_least_norm_of_a_block_drawn_in_parts_is_multiplied_by_rms_of_factors():
+    problem = fit_setup(gauges_and_strips()).problem()
+    factors = np.sqrt(np.arange(len(problem.scale)) % 2 * 2.0)
+    norms = problem.blocks.norms(factors) / np.sqrt(problem.blocks.sizes)
+    least = WeightedProblem.of(problem, factors).blocks.least_norms
+    np.testing.assert_allclose(least, norms * problem.blocks.least_norms)
