@@ -188,6 +188,8 @@ class Comparison:
         What leads the fit by its derivatives in place of the solver.
     shared_errors : callable, optional
         See `SharedErrors`; None where each value errs alone, or with its neighbours.
+    weight : float
+        Factor that a project gives all residuals, 1 by default; the objective has them with it.
     warm_start : WarmStart, optional
         The last solution with derivatives.
     seconds : float
@@ -205,6 +207,7 @@ class Comparison:
     prolong: Callable[[Array], Array] | None = None
     shared_errors: SharedErrors | None = None
     surrogate: Solver | None = None
+    weight: float = 1.0
     warm_start: WarmStart | None = field(default=None, repr=False)
     seconds: float = 0.0
 

@@ -311,16 +311,21 @@ class FitProblem:
         """Return the `Blocks.least_norms` (blocks,) of a fit that weighs its data by their noise.
 
         They are proportional to the mean squared noise of each block, so that all squared
-        residuals weigh by it, and `WEIGHED_BY_NOISE` times the norm of its noise at least.
+        residuals weigh by it and by the weight of the comparison, and `WEIGHED_BY_NOISE` times the
+        norm of its noise at least.
         """
         noise = [
             np.full(sum(comparison.objective.sizes), comparison.objective.least_noise)
             for comparison in self.comparisons
         ]
         priors = [n.prior for n in self.unknowns.nuisance.all if n.prior is not None]
-        norms = self.blocks.norms(np.concatenate([*noise, priors]) / self.scale)
+        weights = np.ones(len(self.blocks.sizes))
+        block_counts = [len(comparison.objective.sizes) for comparison in self.comparisons]
+        of_data = np.repeat([comparison.weight for comparison in self.comparisons], block_counts)
+        weights[: len(of_data)] = of_data
+        norms = self.blocks.norms(np.concatenate([*noise, priors]) / self.scale) / weights
         variances = norms**2 / self.blocks.sizes
-        return WEIGHED_BY_NOISE * variances * float((norms / variances).max())
+        return WEIGHED_BY_NOISE * weights * variances * float((norms / variances).max())
 
     def rows(self, number: int) -> slice:
         """Return where the residuals of comparison `number` (from 0) lie in the residual."""

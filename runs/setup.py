@@ -124,10 +124,13 @@ class FitSetup:
     def with_objective(
         self, test: PreparedTest, comparisons: Sequence[Comparison], weighting: Weighting
     ) -> tuple[Comparison, ...]:
-        """Return the comparisons, with the user's objective function for the test if any."""
+        """Return the comparisons with their weights, and with the user's objective function if any.
+
+        A function does not know the weights of the parts of its test.
+        """
         function = self.project.objectives.get(test.test.name)
         if function is None:
-            return tuple(comparisons)
+            return tuple(replace(c, weight=weighting.weight * c.weight) for c in comparisons)
         weight = weighting.weight / len(comparisons) if weighting.relative else 1.0
         changed = []
         for comparison in comparisons:
@@ -141,7 +144,10 @@ class FitSetup:
             )
             ratio = np.median(comparison.objective.scale) / np.median(objective.scale)
             nuisance = tuple(replace(n, weight=ratio * n.weight) for n in comparison.nuisance)
-            changed.append(replace(comparison, objective=objective, nuisance=nuisance))
+            weight_of_test = weighting.weight
+            changed.append(
+                replace(comparison, objective=objective, nuisance=nuisance, weight=weight_of_test)
+            )
         return tuple(changed)
 
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:

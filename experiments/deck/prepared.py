@@ -100,7 +100,8 @@ class PreparedDeck(PreparedParts):
         for name, compared in fitted.items():
             objective = DeckObjective(compared, rows[name], block_weight * compared.section.weight)
             parts = self.part(name), test.model, solver, objective, test.parameters
-            comparisons.append(Comparison(*parts, surrogate=surrogate))
+            weight = compared.section.weight
+            comparisons.append(Comparison(*parts, surrogate=surrogate, weight=weight))
         return tuple(comparisons)
 
     @property

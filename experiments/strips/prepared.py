@@ -109,8 +109,9 @@ class PreparedStrips(PreparedParts):
         models = self.test.models()
         share = weighting.weight
         directions = self.matched_parts(masks)
+        total = sum(test.weights[direction] for direction in directions)
         if weighting.relative and directions:
-            share /= sum(test.weights[direction] for direction in directions)
+            share /= total
         relative = weighting.relative or test.objective == "relative"
         objectives = {
             direction: self._objective(models[direction], direction, relative, share, masks or {})
@@ -130,6 +131,7 @@ class PreparedStrips(PreparedParts):
                 # A law of logarithmic strain lets yarns slide beside each other where half the
                 # stress along them is more than G12 (docs/reference/law.md): fabrics do not.
                 must_be_stable=False,
+                weight=len(directions) * test.weights[direction] / total,
             )
             for direction, objective in objectives.items()
         )

@@ -187,3 +187,27 @@ def test_least_norm_of_a_block_drawn_in_parts_is_multiplied_by_rms_of_factors():
     norms = problem.blocks.norms(factors) / np.sqrt(problem.blocks.sizes)
     least = WeightedProblem.of(problem, factors).blocks.least_norms
     np.testing.assert_allclose(least, norms * problem.blocks.least_norms)
+
+
+def test_weights_of_tests_and_directions_multiply_what_is_minimised():
+    plain = fit_setup(gauges_and_strips()).problem()
+    (bubble, *strips) = plain.comparisons
+    assert [c.name for c in strips] == ["strips: warp", "strips: fill"]
+    weighted = fit_setup(gauges_and_strips(weight=16, weights={"warp": 3.0})).problem()
+    factor_of = {bubble.name: 1.0, "strips: warp": 16 * 1.5, "strips: fill": 16 * 0.5}
+    factors = np.concatenate([
+        np.full(len(c.objective.sizes), factor_of[c.name]) for c in plain.comparisons
+    ])  # fmt: skip
+    for residual in residuals_about_least_norms(plain):
+        found = merit_by_block(weighted, factors[plain.blocks.block_of] * residual)
+        np.testing.assert_allclose(found, factors * merit_by_block(plain, residual), rtol=1e-9)
+
+
+def test_weight_moves_a_fit_of_contradicting_tests_towards_one_of_them():
+    strips = bf.fit(gauges_and_strips(), tests="strips", starts=1)
+    off = [
+        abs(fit.modulus("E1", 0.02).value - strips.modulus("E1", 0.02).value)
+        for fit in (bf.fit(gauges_and_strips(weight=weight), starts=1) for weight in (1, 16))
+    ]
+    assert off[0] > 1.0
+    assert off[1] < 0.2 * off[0]
