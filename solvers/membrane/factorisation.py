@@ -226,6 +226,7 @@ def tangent_for(
         (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
     )
     orders = [scipy.sparse.csgraph.reverse_cuthill_mckee(pattern, symmetric_mode=True)]
+    orders.append(np.arange(len(free)))  # that of a strip goes row by row, in half the width
     for nodes in swept(quads, points) if is_tube else []:
         unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         orders.append(unknowns[unknowns >= 0])

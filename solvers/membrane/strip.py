@@ -140,7 +140,8 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     record = IncrementRecord(membrane, len(levels))
     membrane.keep_tangent = True
     steps = math.ceil(levels[-1] / pull.gauge_length / pull.settings.largest_strain)
-    increments = SolvedIncrements(levels, len(levels) if model.unloaded else max(10, steps))
+    smallest_count = len(levels) if model.unloaded else max(6, steps)
+    increments = SolvedIncrements(levels, smallest_count)
     for i, u in enumerate(pull.solve(increments, request)):
         rates.append(pull.rate.reshape(shape))
         if derivatives is not None:
@@ -380,15 +381,26 @@ class Pulling(Loading):
         return self.admissible(u)
 
 
-#: Largest value, over the step, of a cubic that is zero at its ends and has slopes 0 and 1 there.
-CUBIC_BOUND = 4 / 27
+@dataclass(frozen=True)
+class ReadingError:
+    """Settings of the estimate of the error of a reading, and of the steps that follow from it."""
+
+    #: Largest value, over a step, of a cubic that is zero at its ends with slopes 0 and 1 there.
+    cubic_bound: float = 4 / 27
+    #: A response is smooth where its fourth derivative grows by less than this factor in a step,
+    max_growth: float = 6.0
+    #: and the error of its reading, h^4/384 times this derivative, is multiplied by this.
+    safety: float = 4.0
+    largest_factor: float = 4.0  #: of one step to the next
+    margin: float = 0.9  #: of the step at which the error would be the largest allowed
 
 
 class SolvedIncrements:
     """Increments that are solved, chosen by the curvature of the response as it is computed.
 
-    A step spans several increments where the cubic that is read between its ends, from values and
-    slopes there, differs little from that of the step before. The first three have no step between.
+    A step spans several increments where the response differs little from the cubic that is read
+    between its ends, from values and slopes there. How much it differs follows from the cubic of
+    the step before. The first three increments have no step between.
 
     Parameters
     ----------
@@ -409,6 +421,8 @@ class SolvedIncrements:
         self._responses = list[float]()
         self._slopes = list[float]()
         self._is_stable = list[bool]()
+        self._fourth_derivative = 0.0
+        self.settings = ReadingError()
 
     @property
     def previous(self) -> int:
@@ -445,7 +459,7 @@ class SolvedIncrements:
         """
         i = self.current
         span = i - self.previous
-        error = self._reading_error(i, response, slope)
+        fourth_derivative, error = self._reading_error(i, response, slope)
         is_change = bool(self.solved) and is_stable != self._is_stable[-1]
         if (error > 1.0 or is_change) and span > 1:
             self.step = span // 2
@@ -454,22 +468,41 @@ class SolvedIncrements:
         self._responses.append(response)
         self._slopes.append(slope)
         self._is_stable.append(is_stable)
-        # The error grows with the fourth power of the step.
-        if len(self.solved) > 2 and 2**4 * error < 1.0:
-            self.step = min(2 * span, self.longest_step)
+        if len(self.solved) > 2:
+            self._fourth_derivative = fourth_derivative
+            # The error grows with the fourth power of the step.
+            factor = self.settings.margin * max(error, 1e-9) ** -0.25
+            step = int(min(factor, self.settings.largest_factor) * span)
+            self.step = max(1, min(step, self.longest_step))
         return True
 
-    def _reading_error(self, i: int, response: float, slope: float) -> float:
-        """Return the error of a reading within the step to i, over that which is allowed."""
+    def _reading_error(self, i: int, response: float, slope: float) -> tuple[float, float]:
+        """Return the fourth derivative up to i, and the error of a reading over that allowed."""
         if len(self.solved) < 2 or self.longest_step == 1:
-            return 0.0
+            return 0.0, 0.0
+        settings = self.settings
         knots = self.levels[self.solved[-2:]]
-        by_value, by_slope = hermite_slope_weights(knots, self.levels[[i]])
+        position = self.levels[[i]]
+        by_value, by_slope = hermite_weights(knots, position)
+        cubic = by_value @ self._responses[-2:] + by_slope @ self._slopes[-2:]
+        by_value, by_slope = hermite_slope_weights(knots, position)
         cubic_slope = by_value @ self._responses[-2:] + by_slope @ self._slopes[-2:]
-        step = self.levels[i] - knots[-1]
-        deviation = CUBIC_BOUND * step * abs(slope - float(cubic_slope[0]))
-        largest = np.abs([*self._responses, response]).max()
-        return float(deviation / (self.allowed_error * largest))
+        deviation = abs(response - float(cubic[0]))
+        slope_deviation = abs(slope - float(cubic_slope[0]))
+        last_step = float(knots[1] - knots[0])
+        step = float(position[0] - knots[1])
+        both = last_step + step
+        # A cubic through values and slopes at a and b deviates at x by a 24th of the fourth
+        # derivative times (x - a)^2 (x - b)^2.
+        fourth_derivative = max(
+            24 * deviation / (step * both) ** 2,
+            12 * slope_deviation / (step * both * (both + step)),
+        )
+        error = settings.cubic_bound * step * slope_deviation
+        if fourth_derivative < settings.max_growth * self._fourth_derivative:
+            error = min(error, settings.safety * fourth_derivative * step**4 / 384)
+        largest = float(np.abs([*self._responses, response]).max())
+        return fourth_derivative, error / (self.allowed_error * largest)
 
     def read(self, values: Array, slopes: Array | None = None) -> Array:
         """Return values at all increments (n, ...) from those at solved ones.
