@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.strip_models import bias_strip
 from bubblefit.solvers.membrane import bubble, factorisation
 from bubblefit.solvers.membrane.factorisation import (
     BandedTangent,
@@ -54,6 +55,14 @@ def test_tangents_assemble_and_solve_a_known_matrix(monkeypatch, limit, kind):
         left = rhs[:, 0] - tangent.times(tangent.step(rhs[:, 0], True)[:, None])[:, 0]
         assert np.linalg.norm(left) <= 1e-3 * np.linalg.norm(rhs[:, 0])
         assert (tangent.near is before) == kept
+
+
+def test_band_of_a_strip_is_as_wide_as_a_row_of_its_quads():
+    mesh = bias_strip(20.0, 22.0, 0.8, across=6, along=12).mesh
+    unknowns = np.arange(mesh.points.size)
+    tangent = tangent_for(mesh.quads, mesh.points, unknowns[unknowns % 3 < 2])
+    assert isinstance(tangent, BandedTangent)
+    assert tangent.width == 2 * (6 + 2) + 1
 
 
 #: Sewn 4 % too long both ways: pressed together at low pressures, taut from 97 kPa on.

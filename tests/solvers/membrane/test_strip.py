@@ -281,6 +281,21 @@ def test_fewer_increments_are_solved_where_the_response_is_smooth():
     assert increments.solved[-1] == 99
 
 
+@pytest.mark.parametrize(
+    ("rate", "error", "most"), [(1.0, 1e-6, 14), (2.0, 1e-4, 11), (2.0, 1e-6, 27)]
+)
+def test_steps_grow_to_a_share_of_the_error_that_is_allowed(rate, error, most):
+    def response(x):
+        return np.sin(rate * x)
+
+    def slope(x):
+        return rate * np.cos(rate * x)
+
+    increments = solved(response, slope, smallest_count=4, error=error)
+    assert len(increments.solved) <= most
+    assert 0.05 * error < reading_error(increments, response, slope) < 0.25 * error
+
+
 @pytest.mark.parametrize("kink", [0.505, 0.5099, 0.5001, 0.57])
 def test_every_increment_is_solved_at_a_kink(kink):
     def response(x):
