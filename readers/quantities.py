@@ -165,6 +165,11 @@ def _words(name: str) -> set[str]:
     return set(_split_words(split_unit(name)[0].casefold()))
 
 
+def is_along_fill(name: str) -> bool:
+    """Return whether the name of a coordinate says that it is along the fill."""
+    return not FILL.isdisjoint(_words(name))
+
+
 def _split_words(plain: str) -> list[str]:
     """Return the words of a name, without digits and punctuation."""
     return re.split(r"[\W\d_]+", plain)

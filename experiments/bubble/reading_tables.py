@@ -15,7 +15,7 @@ from ...lazy_modules import pandas as pd
 from ...readers.frames import frame_files
 from ...readers.inflations import branches_of
 from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
-from ...readers.quantities import columns_of
+from ...readers.quantities import columns_of, is_along_fill
 from ...readers.units import CURVATURE_UNITS, LENGTH_UNITS, PRESSURE_UNITS, STRAIN_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile
@@ -70,7 +70,8 @@ def read_readings(section: BubbleSection, place: Place) -> GaugeReadings | None:
     if data.heights is not None:
         series += _heights(data.heights, place, section.inflation, files)
     if data.profiles is not None:
-        series += _profiles(data.profiles, place, section.pressures, files)
+        listed = section.pressures
+        series += _profiles(data.profiles, place, listed, section.inflation, files)
     noise: dict[Quantity, float] = {}
     if data.apex is not None:
         span = data.apex.span or USUAL_SPAN * outline.radius
@@ -135,21 +136,20 @@ def _profiles(
     section: ProfilesSection,
     place: Place,
     pressures: Sequence[float] | None,
+    inflation: int,
     files: list[DataFile],
 ) -> list[ReadingSeries]:
     """Return the series of each line, and add the files that were read.
 
     `pressures` (MPa) are those of the files, where these have no such column.
     """
+    first = len(files)
     tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
     if not tables:
         return []
-    points = pd.concat(_with_pressures(tables, place, pressures))
-    specimens = pd.factorize(points["specimen"])[0] if "specimen" in points else 0
-    points = points.assign(specimen=specimens)
-    points = points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
-    if "axis" not in points:
-        points = points.assign(axis=str(section.direction_deg))
+    under_pressure = _with_pressures(tables, place, pressures)
+    lines = _with_axes(under_pressure, section, files[first:])
+    points = _profiles_of_inflation(lines, inflation)
     series = []
     for axis, line in points.groupby("axis", sort=False):
         angle = np.radians(_direction_of_line(str(axis).lower(), place))
@@ -175,6 +175,56 @@ def _with_pressures(
         problem = f"expected one for each of {len(tables)} tables without such a column"
         raise place.error("pressures", problem)
     return [table.assign(pressure=p) for table, p in zip(tables, pressures, strict=True)]
+
+
+def _with_axes(
+    tables: Sequence[pd.DataFrame], section: ProfilesSection, files: Sequence[DataFile]
+) -> Sequence[pd.DataFrame]:
+    """Return tables of profiles with a column of axes, that of one line a table if they have none.
+
+    The line is along the fill where the name of its coordinate says that, and the section nothing.
+    """
+    if "axis" in tables[0]:
+        return tables
+    axes = [str(section.direction_deg)] * len(tables)
+    if "direction_deg" not in section.model_fields_set:
+        for number, file in enumerate(files):
+            if is_along_fill(file.source.columns["coordinate"]):
+                axes[number] = str(AXES["fill"])
+    return [table.assign(axis=axis) for table, axis in zip(tables, axes, strict=True)]
+
+
+def _profiles_of_inflation(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
+    """Return the rows of one inflation of each line of each specimen, which get numbers.
+
+    Tables of a pressure each are in order of time; one of several pressures begins at rest.
+    """
+    has_inflations = any(table["pressure"].nunique() > 1 for table in tables)
+    recordings = range(len(tables)) if has_inflations else [0] * len(tables)
+    points = pd.concat(
+        [table.assign(recording=k) for table, k in zip(tables, recordings, strict=True)],
+        ignore_index=True,
+    )
+    specimens = pd.factorize(points["specimen"])[0] if "specimen" in points else 0
+    points = points.assign(specimen=specimens)
+    parts: list[pd.DataFrame] = []
+    for _, line in points.groupby(["recording", "axis", "specimen"], sort=False):
+        parts += _runs_of_inflation(line, inflation)
+    points = pd.concat(parts).sort_index()
+    return points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
+
+
+def _runs_of_inflation(line: pd.DataFrame, inflation: int) -> list[pd.DataFrame]:
+    """Return the rows of one inflation of a line: its profiles one by one, or place by place."""
+    scatter = LIMITS.pressure_scatter * line["pressure"].max()
+    profile = (line["pressure"].diff().abs() > scatter).cumsum()
+    is_by_place = line["coordinate"].diff().ne(0.0).sum() < 1 + profile.iloc[-1]
+    parts = []
+    for _, rows in line.groupby("coordinate") if is_by_place else [(0, line)]:
+        runs = pd.factorize(profile[rows.index])[0]
+        pressures = rows["pressure"].groupby(runs).first().to_numpy(float)
+        parts.append(rows[np.isin(runs, loading_rows(pressures, inflation))])
+    return parts
 
 
 def _direction_of_line(name: str, place: Place) -> float:

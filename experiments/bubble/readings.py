@@ -54,6 +54,7 @@ class ReadingLimits:
     """Which readings are used, and at how many pressures the model is run for them."""
 
     least_pressure: float = 1e-3  # over the largest: a reading below is one without pressure
+    pressure_scatter: float = 0.01  # over the largest: profiles within it are at one pressure
     max_frames: int = 12
     max_points: int = 40  # of a profile at one pressure
     max_readings: int = 200  # of a specimen at one place; of more, neighbours are averaged

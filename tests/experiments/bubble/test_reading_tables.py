@@ -299,3 +299,66 @@ def test_direction_of_a_line_that_is_no_angle_is_refused(tmp_path):
     (tmp_path / "p.csv").write_text(f"axis,p (kPa),s (mm),dz (mm)\n{rows}\n")
     text = PROJECT + '[bubble.data.profiles]\nfiles = ["p.csv"]\n'
     assert "expected x, y or degrees from the warp" in refusal(tmp_path, text)
+
+
+PROFILES = PROJECT + "[bubble.data.profiles]\n"
+
+
+def test_line_whose_coordinate_is_y_is_along_the_fill(tmp_path):
+    for axis in "xy":
+        rows = "10;0;9.6\n10;50;7\n20;0;12\n20;50;9\n"
+        (tmp_path / f"{axis}.csv").write_text(f"pressure (kPa);{axis} (mm);z (mm)\n{rows}")
+    (series,) = bubble_of(tmp_path, PROFILES + 'files = ["y.csv"]\n').data.series
+    np.testing.assert_allclose(series.positions, [[0, 0], [0, 50]] * 2, atol=1e-9)
+    both = PROFILES + 'files = ["x.csv", "y.csv"]\n'
+    along_x, along_y = bubble_of(tmp_path, both).data.series
+    np.testing.assert_allclose(along_x.positions, [[0, 0], [50, 0]] * 2, atol=1e-9)
+    np.testing.assert_allclose(along_y.positions, series.positions)
+    for degrees, place in ((0, [50, 0]), (90, [0, 50])):
+        (series,) = bubble_of(tmp_path, f"{both}direction_deg = {degrees}\n").data.series
+        assert len(series.value) == 8
+        np.testing.assert_allclose(series.positions, [[0, 0], place] * 4, atol=1e-9)
+
+
+CYCLES = (10, 20, 10, 2, 12, 20)
+
+
+@pytest.mark.parametrize("is_by_place", [False, True])
+def test_only_one_inflation_of_profiles_is_used(tmp_path, is_by_place):
+    order = [(k, p, s) for k, p in enumerate(CYCLES) for s in (0, 50)]
+    if is_by_place:
+        order.sort(key=lambda row: (row[2], row[0]))
+    rows = "\n".join(f"{p};{s};{1 + k}" for k, p, s in order)
+    (tmp_path / "p.csv").write_text(f"pressure (kPa);x (mm);z (mm)\n{rows}\n")
+    for inflation, heights in ((1, {0.01: 1, 0.02: 2}), (2, {0.012: 5, 0.02: 6})):
+        text = PROFILES.replace("radius", f"inflation = {inflation}\nradius")
+        (series,) = bubble_of(tmp_path, text + 'files = ["p.csv"]\n').data.series
+        assert len(series.value) == 4
+        assert dict(zip(series.pressure, series.value, strict=True)) == heights
+    text = text.replace("inflation = 2", "inflation = 9") + 'files = ["p.csv"]\n'
+    assert "inflation: expected at most 2" in refusal(tmp_path, text)
+
+
+def test_profiles_of_a_pressure_each_are_inflations_in_the_order_of_their_files(tmp_path):
+    for k, p in enumerate(CYCLES):
+        rows = f"{p};0;{1 + k}\n{p};50;{1 + k}\n"
+        (tmp_path / f"p{k}.csv").write_text(f"pressure (kPa);x (mm);z (mm)\n{rows}")
+    text = PROFILES.replace("radius", "inflation = 2\nradius") + 'files = ["p*.csv"]\n'
+    (series,) = bubble_of(tmp_path, text).data.series
+    np.testing.assert_allclose(series.value, [5, 5, 6, 6])
+
+
+def test_profiles_of_one_specimen_in_two_tables_are_used_together(tmp_path):
+    for name in ("a", "b"):
+        rows = "\n".join(f"{p};{s};{p - s / 10}" for p in (10, 20, 40) for s in (0, 50))
+        (tmp_path / f"{name}.csv").write_text(f"pressure (kPa);x (mm);z (mm)\n{rows}\n")
+    (series,) = bubble_of(tmp_path, PROFILES + 'files = ["a.csv", "b.csv"]\n').data.series
+    assert len(series.value) == 12
+
+
+def test_profile_whose_pressure_scatters_is_used_whole(tmp_path):
+    random = np.random.default_rng(1)
+    rows = "\n".join(f"{p:.4f};{s};9" for s, p in enumerate(random.normal(10, 0.02, 30)))
+    (tmp_path / "p.csv").write_text(f"pressure (kPa);x (mm);z (mm)\n{rows}\n")
+    (series,) = bubble_of(tmp_path, PROFILES + 'files = ["p.csv"]\n').data.series
+    assert len(series.value) == 30
