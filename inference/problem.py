@@ -345,6 +345,10 @@ class FitProblem:
         names = [comparison.name for comparison in self.comparisons]
         return dict(zip(names, norms, strict=False))
 
+    def value_of_data(self, residual: Array) -> float:
+        """Return the objective e of a residual (m,) without the priors."""
+        return float(np.concatenate([*self.norms(residual).values()]).sum())
+
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
         """Return the same problem with other solvers, one for each comparison, as a surrogate."""
         comparisons = tuple(

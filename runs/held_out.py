@@ -107,14 +107,14 @@ def held_out(
     if status == ANALYSES_USED_UP:
         notes += (Note(NOT_CONVERGED, NUISANCE_NOT_CONVERGED.format(problem.analyses), name),)
     rms = errors(problem, point.residual)
+    error = problem.value_of_data(point.residual)
     if nuisance is not None:
-        norms = np.concatenate(list(problem.norms(point.residual).values()))
-        return HeldOut(name, float(norms.sum()), rms, units, notes, analyses=problem.analyses)
+        return HeldOut(name, error, rms, units, notes, analyses=problem.analyses)
     findings = presenter_of(prepared.test.kind).findings(
         prepared, fitted_test(prepared, law, make_solver, problem, point)
     )
     words = findings.quality, findings.numbers
-    return HeldOut(name, point.value, rms, units, notes, *words, problem.analyses)
+    return HeldOut(name, error, rms, units, notes, *words, problem.analyses)
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:

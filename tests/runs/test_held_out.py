@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
@@ -14,6 +15,8 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..builders.closed_forms import LAW
+from ..builders.gauges import LAW as STIFF_LAW
+from ..builders.gauges import PRESSURES, THICKNESS, gauge_heights
 from ..builders.projects import fit_setup, known_bubble
 
 
@@ -54,6 +57,17 @@ def test_nuisance_is_fitted_to_omitted_test(tmp_path):
     found = held_out(replace(shifted, test=without), law, solver)
     assert found.error > 0.015
     assert found.rms == {"bubble": pytest.approx(1.5 / np.sqrt(3.0), rel=1e-6)}
+
+
+def test_error_is_of_data_alone_without_priors():
+    """A gauge that reads 1 mm too high, and is known to 0.1 mm."""
+    heights = gauge_heights([[0.0, 0.0]]).T + 1.0
+    keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
+    bubble = bf.Bubble.heights(PRESSURES, heights, nuisance={"height_offset": 0.1}, **keys)
+    law = bf.Law("constant", bounds={"E1": [20, 3000], "E2": [20, 3000], "G12": [1, 300]})
+    setup = fit_setup(bf.Project.of(bubble, law, fabric=bf.Fabric("", THICKNESS)))
+    found = held_out(setup.tests[0], STIFF_LAW, setup.make_solver)
+    assert found.error == pytest.approx(found.rms["bubble"] / heights.max(), rel=1e-9)
 
 
 def test_failed_law_is_reported(project, monkeypatch):
