@@ -204,7 +204,7 @@ def fold_error(
     point = judged.evaluate(unknowns, False, warm=False)
     if point is None:
         return FoldError(fold, None, {}, analyses)
-    value = judged.blocks.value(point.residual)
+    value = judged.value_of_data(point.residual)
     return FoldError(fold, value, errors(judged, point.residual), analyses)
 
 

@@ -50,6 +50,16 @@ def test_error_of_fold_is_difference_between_specimens(project):
         assert fold.value == pytest.approx(sum(expected.values()), rel=1e-3)
 
 
+def test_error_of_fold_is_of_data_alone_without_priors(tmp_path, monkeypatch):
+    keys = 'name = "one"\n', 'name = "one"\ncompliance = 2e-4\ncompliance_prior = 1e-4\n'
+    setup = fit_setup(constant_strips(tmp_path, keys), "one")
+    unknowns = setup.problem().unknowns.at(np.array([10.0, 200.0, 300.0]))
+    unknowns[-1] = 4e-4  # two standard deviations off
+    monkeypatch.setattr(study, "fit_of", lambda *_: (setup, unknowns, 1))
+    fold = study.fold_error(setup, folds(setup, 5)[0], 0, 1)
+    assert fold.value == pytest.approx(sum(fold.rms.values()), rel=1e-9)
+
+
 def setup_of(**specimens):
     return SimpleNamespace(
         tests=[SimpleNamespace(specimens=specimens)], options="options",
