@@ -317,18 +317,16 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     added to the model; a fitted tilt or shift, and a constant field, are not.
     """
     test = prepared.test
-    pressures: Sequence[float] = test.pressures
     nodes = fitted.comparisons[0].model.mesh.points
-    frames = fitted.histories[0].displacement
-    modelled = [*(frames + amounts_of(OFFSETS, fitted.nuisance))]
+    frames = fitted.histories[0].displacement + amounts_of(OFFSETS, fitted.nuisance)
+    targets = objective_of(fitted).targets
+    pressures = [target.pressure for target in targets]
+    modelled = [target.nodal_displacement(frames, k) for k, target in enumerate(targets)]
     measured = [(field.points, field.displacement) for field in prepared.fields]
     caption = f"{test.name}: lines are the model, dots are {prepared.source}"
     if test.sheet.reference_frame is not None:
-        targets = objective_of(fitted).targets
-        caption += ", both counted from the loaded frame"
-        pressures = [target.pressure for target in targets]
-        modelled = [target.nodal_displacement(frames, k) for k, target in enumerate(targets)]
         measured = [(t.at_places(nodes[:, :2]), t.displacement) for t in targets]
+        caption += ", both counted from the loaded frame"
     name = f"{test.name} cuts"
     return bubbles.cut_charts(name, pressures, nodes, modelled, measured, f"{caption}.")
 

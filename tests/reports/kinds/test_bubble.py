@@ -164,7 +164,7 @@ def test_words_say_why_there_is_no_map_of_strain():
 def test_profiles_count_model_and_data_from_the_loaded_frame():
     start, end = INFLATED.displacement
     prepared, fitted = fitted_bubble(0.0, reference_frame=0)
-    prepared.test.pressures, prepared.fields = FINE.pressures, ()
+    prepared.fields = ()
     sample = scipy.sparse.eye(len(start), format="csr")
     target = FieldTarget(FINE.pressures[1], end - start, sample, frame=1, reference_frame=0)
     fitted.comparisons[0].objective = FieldObjective([target], "mm")
