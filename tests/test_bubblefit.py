@@ -59,8 +59,9 @@ folder = Path(sys.argv[1])
 locks = licences.LicenceSettings(licences=1, licence_folder=str(folder / "locks"))
 with scratch.run_folder("t", folder, False, "t", "log") as place:
     assert scratch.sweep([folder]) == [] and place.exists()
-    words = [sys.executable, "-c", "import time; print('begun', flush=True); time.sleep(60)"]
-    ended = process.run_process(words, place, place / "log", timeout=5.0)
+    program = "import time; print('begun', flush=True); time.sleep(60)"
+    words = [sys.executable, "-I", "-S", "-c", program]
+    ended = process.run_process(words, place, place / "log", timeout=2.0)
     assert ended.timed_out and ended.seconds < 30, ended
     assert process.log_tail(place / "log") == "begun"
 assert not place.exists()

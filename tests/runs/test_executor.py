@@ -210,6 +210,7 @@ def test_late_workers_are_waited_for_and_used():
 
 
 def test_command_ends_at_once_without_a_scheduler(strips_project, tmp_path, monkeypatch):
+    monkeypatch.setattr("bubblefit.solvers.process.CONNECT_S", 0.5)
     begun = time.monotonic()
     arguments = ("fit", strips_project.path, "--out", tmp_path / "out")
     done = in_process(*arguments, "--scheduler", NOBODY, cwd=tmp_path, code=2)

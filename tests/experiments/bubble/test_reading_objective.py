@@ -116,6 +116,15 @@ def test_series_of_several_quantities_are_compared_by_their_noise():
     assert single.unit == "%" and single.least_noise == pytest.approx(0.01)
 
 
+def test_noise_is_stated_or_not_as_that_of_the_first_series():
+    model, _ = inflated()
+    objective = apex_objective(model)
+    readers = objective.readers[1:]  # curvature, strain, strain
+    for stated, noise_is in (("curvature", "given"), ("strain", "assumed")):
+        mixed = ReadingObjective(readers, "e", 1.0, {stated: 0.02})
+        assert mixed.noise_is == noise_is and 0.02 in mixed.noises
+
+
 def test_offset_of_a_gauge_moves_its_readings_alone():
     model, history = inflated()
     objective = objective_at(PLACES, model)

@@ -71,6 +71,30 @@ def test_specimens_of_points_can_be_left_out(published_strips, exported_strips):
     assert prepared.reach(masks).break_shares[1] == prepared.test.reach.break_shares[1]
 
 
+def test_specimens_whose_files_name_them_alike_are_numbered_from_one(exported_strips):
+    prepared = exported_strips()
+    test = prepared.test
+    strips = {
+        direction: replace(strip, curves=tuple(replace(c, specimen="A") for c in strip.curves))
+        for direction, strip in test.strips.items()
+    }
+    alike = replace(prepared, test=replace(test, strips=strips)).parts["specimens"]
+    assert sorted(alike) == [f"{cut}, specimen {n}" for cut in ("bias", "warp") for n in (1, 2)]
+    for number in (0, 1):
+        mask = alike[f"warp, specimen {number + 1}"]["strips: warp"]
+        np.testing.assert_array_equal(mask, test.strips["warp"].specimen_of != number)
+
+
+def test_unknown_compliance_is_bounded_by_four_deviations_of_its_prior(exported_strips):
+    keys = "compliance = 0.001\ncompliance_prior = 0.002\n[warp]"
+    for compared in exported_strips(("[warp]", keys)).comparisons(MembraneSolver, Weighting()):
+        (compliance,) = compared.nuisance
+        assert (compliance.lower, compliance.upper) == (0.0, pytest.approx(0.009))
+        assert (compliance.start, compliance.prior) == (0.001, 0.002)
+        assert compliance.shared and compliance.unit == "mm/N"
+        assert compared.objective.compliance == (compliance.name, 0.001)
+
+
 def test_loads_that_are_zero_have_no_relative_error(exported_strips, tmp_path):
     u = np.linspace(0, 4, 21)  # with loads only beyond the end of the model
     text = "Extension (mm),Load (N)\n" + rows_of(",", u, np.where(u > 3, 80 * u, 0))
