@@ -1,8 +1,10 @@
 """readers/histories.py: load histories of any machine, and their cycles."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from bubblefit.readers.histories import find_cycles, rest_limit_of
+from bubblefit.readers.histories import LoadHistory, find_cycles, pace_of, rest_limit_of
 
 
 def test_small_cycles_are_found_and_overshoot_is_none():
@@ -24,3 +26,15 @@ def test_pressures_within_the_noise_of_a_log_are_none():
     assert rest_limit_of(ramp) < 2e-5
     # A few readings in great steps are no noise.
     assert rest_limit_of(np.array([0.0, 0.001, 0.02, 0.05, 0.1])) == 0.0
+
+
+def test_pace_is_the_rate_of_loadings_and_the_longest_hold_at_a_peak():
+    """Holds of 60 s and 20 s at the peaks, and of 120 s at rest, which does not count."""
+    time = np.arange(0.0, 331.0)
+    turns = [0, 10, 70, 80, 200, 210, 230, 240, 330]
+    load = np.interp(time, turns, [0, 100, 100, 0, 0, 100, 100, 0, 0])
+    history = LoadHistory(Path("a.csv"), load, 1e-4 * load, time)
+    pace = pace_of([history, LoadHistory(Path("b.csv"), load, 1e-4 * load)])
+    assert pace.rate == pytest.approx(1e-3)
+    assert pace.hold == pytest.approx(60.0, abs=2.0)
+    assert np.isnan(pace_of([]).hold)

@@ -8,6 +8,7 @@ from bubblefit.readers.inflations import (
     OTHER_INFLATION,
     RELEASED,
     REPEATED,
+    Inflations,
     branches_of,
     choose_frames,
     has_several,
@@ -31,6 +32,18 @@ def test_inflations_are_found_in_the_order_of_time():
     assert choose_frames(seen, inflation="all")[0] == (2, 4, 3, 5, 7, 8, 10, 11, 12)
     assert choose_frames(seen, count=2, inflation="all")[0] == (4, 5, 7, 8, 11, 12)
     assert [branch.tolist() for branch in branches_of(seen[8:5:-1])] == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize("branches", [1, 2, 5, 6])
+def test_line_counts_inflations_with_or_without_their_last_release(branches):
+    peaks = np.resize([0.0, 0.03], branches + 1)
+    rows = np.linspace(0.0, branches, 4 * branches + 1)
+    pressure = np.interp(rows, np.arange(branches + 1), peaks)
+    count = (branches + 1) // 2
+    all_taken = Inflations(pressure, 100 * pressure, "all")
+    assert all_taken.line == f"all frames of {count} inflations are taken, in their order"
+    first = Inflations(pressure, 100 * pressure, 1)
+    assert first.line.startswith(f"inflation 1 of {count}, the first loading, is taken; ")
 
 
 def test_frame_near_enough_to_a_pressure_is_chosen():

@@ -145,3 +145,12 @@ def test_rows_with_and_without_holes_have_the_same_numbers(tmp_path, monkeypatch
     for name, values in read("").items():
         assert with_hole[name][:4].tolist() == pytest.approx(values.tolist(), rel=1e-15)
     assert math.isnan(with_hole["dx"][4]) and values.tolist() == [k + 0.25 for k in range(4)]
+
+
+def test_first_six_of_the_columns_that_a_quantity_may_be_are_named(tmp_path):
+    names = [f"{name} (mm)" for name in ("u", "U", "ux", "uX", "Ux", "UX", "dx")]
+    cells = ",".join(map(str, range(len(names) + 4)))
+    layout = layout_of(tmp_path, f"x,y,{','.join(names)},dy,dz\n{cells}\n")
+    message = complaint(quantity_columns, tmp_path / "a.txt", layout, {}, PLAIN)
+    listed = " or ".join(map(repr, names[:6]))
+    assert f"line 1: the column of dx may be {listed}; name one with columns" in message

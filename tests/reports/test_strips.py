@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.reports import strips
-from bubblefit.reports.charts import Charts, scale_ends
+from bubblefit.reports.charts import Charts, axis_ends, scale_ends
 from bubblefit.reports.strips import StripCurves, load_charts, order_chart
 
 from ..support.charts import check_charts, legend, lines, named, shown
@@ -44,6 +44,12 @@ def test_loads_of_models_are_drawn_beside_points():
     assert legend(charts) == names
     drawn = load_charts("l", [strip(), strip(models=[("bubble", U, 95 * U)], rms=())]).charts
     assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
+
+
+def test_axis_of_measured_loads_begins_at_zero_however_high_they_are():
+    points = ([3.0, 4.0, 5.0], [500.0, 550.0, 600.0])
+    (chart,) = load_charts("l", [strip(points=points, models=[], polynomial=None, rms=())]).charts
+    assert axis_ends(chart)[1][0] == 0.0
 
 
 def draw_strip(shear):
