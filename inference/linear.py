@@ -330,7 +330,7 @@ def limit_of(
     error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
     blocks = problem.blocks
     # Weights as in the objective; an exact fit, whose norms are zero, takes those of the error.
-    norms = blocks.norms(best.residual)
+    norms = np.maximum(blocks.norms(best.residual), blocks.least_norms)
     if not (norms > 0).any():
         norms = blocks.norms(error)
     if not (norms > 0).any():

@@ -148,6 +148,26 @@ def test_posterior_of_the_fine_mesh_is_shifted_by_its_step():
     assert fine.covariance - own.covariance == pytest.approx(np.full((4, 4), 0.002**2))
 
 
+def test_step_of_blocks_below_their_least_norm_is_between_optima_of_the_merit():
+    problem = Linear(UNKNOWNS, Blocks(SIZES, np.array([100.0, 900.0])))
+    random = np.random.default_rng(5)
+    drawn = ROWS * random.standard_normal(len(ROWS))
+    error = 0.2 * random.standard_normal(len(ROWS))
+    root = 1.0 / np.sqrt(problem.blocks.least_norms)[problem.blocks.block_of]
+    optima = [
+        TRUTH + np.linalg.lstsq(root[:, None] * JACOBIAN, root * values, rcond=None)[0]
+        for values in (drawn, drawn - error)
+    ]
+    merits = [
+        problem.blocks.merit(JACOBIAN @ (optima[1] + change - TRUTH) - drawn + error)
+        for change in 1e-3 * np.vstack([np.zeros(4), np.eye(4), -np.eye(4)])
+    ]
+    assert np.argmin(merits) == 0
+    point = evaluation(optima[0], drawn)
+    limit = limit_of(problem, point, point.residual + 0.75 * error, 2.0)
+    np.testing.assert_allclose(limit.step, optima[1] - optima[0], rtol=1e-6)
+
+
 @pytest.fixture(scope="module")
 def best():
     fit = bubble_problem(CONSTANT)
