@@ -15,7 +15,7 @@ from ...lazy_modules import pandas as pd
 from ...readers.frames import frame_files
 from ...readers.inflations import branches_of
 from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
-from ...readers.quantities import columns_of, is_along_fill
+from ...readers.quantities import columns_named, columns_of, is_along_fill
 from ...readers.units import CURVATURE_UNITS, LENGTH_UNITS, PRESSURE_UNITS, STRAIN_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile
@@ -105,6 +105,7 @@ def _check_nuisance(section: BubbleSection, place: Place) -> None:
         "nuisance.registration": nuisance.registration == "fitted",
         "nuisance.tilt": nuisance.tilt is not None,
         "nuisance.shift": nuisance.shift is not None,
+        "nuisance.turn": nuisance.turn is not None,
         "sheet.constant_field": bool(section.sheet.constant_field),
         "sheet.from_pressure": section.sheet.from_pressure is not None,
     }
@@ -364,26 +365,47 @@ def _read_table(
         if table.column(name):
             headings[name] = table.column(name)
     contents: dict[str, Any] = {}
-    stated = {}
+    stated: dict[str, str | None] = {}
     for name, column in headings.items():
-        if name == "specimen":
-            contents[name] = table.specimens(column)
-            continue
-        if name == "axis":
-            contents[name] = table.table.text(column).to_numpy()
-            continue
-        units, unit_key = CHANNELS[name.partition(" ")[0].partition("_")[0]]
-        stated[name] = getattr(section, unit_key, None)
-        contents[name] = table.values(column, units, Channel(unit=stated[name]), unit_key)
+        contents[name], stated[name] = _contents(table, section, name, column)
     source = table.source(headings, stated, table.notes)
     return pd.DataFrame(contents), DataFile(path, source, None)
+
+
+def _contents(
+    table: MachineTable, section: TableSection, name: str, column: str
+) -> tuple[Any, str | None]:
+    """Return the contents of the column of a quantity, and the unit that the section states."""
+    if name == "specimen":
+        return table.specimens(column), None
+    if name == "axis":
+        return table.table.text(column).to_numpy(), None
+    units, unit_key = CHANNELS[name.partition(" ")[0].partition("_")[0]]
+    if isinstance(section, ApexSection) and units is CURVATURE_UNITS:
+        _check_unit_of_curvature(table, column, section)
+    unit = getattr(section, unit_key, None)
+    return table.values(column, units, Channel(unit=unit), unit_key), unit
+
+
+def _check_unit_of_curvature(table: MachineTable, column: str, section: ApexSection) -> None:
+    """Refuse a curvature in a length, and a radius in another unit."""
+    unit = table.units[column] or section.curvature_unit
+    is_radius = section.curvature_is == "radius"
+    if unit in CURVATURE_UNITS and (unit in LENGTH_UNITS) != is_radius:
+        problem = (
+            f"{unit} is no unit of curvature_is = {section.curvature_is!r}: "
+            'a "radius" is in mm or m, a "curvature" or "half" of it in 1/mm, 1/m or 1/cm'
+        )
+        raise table.error(column, problem)
 
 
 def _gauge_columns(
     table: MachineTable, gauges: Sequence[str], named: Sequence[str]
 ) -> dict[str, str]:
     """Return the column of each gauge, of those named or else found."""
-    columns = named or [table.names[i] for i in columns_of(table.names, "height", {})]
+    columns = _named_columns(table, named)
+    if not named:
+        columns = [table.names[i] for i in columns_of(table.names, "height", {})]
     if not named and len(columns) < len(gauges):
         # Gauges that are named by their places: all columns of a length.
         columns = [name for name in table.names if table.units[name] in CHANNELS["height"][0]]
@@ -394,6 +416,21 @@ def _gauge_columns(
         )
         raise InputError(table.table.path, f"line {table.header}", problem)
     return dict(zip(gauges, columns, strict=True))
+
+
+def _named_columns(table: MachineTable, named: Sequence[str]) -> list[str]:
+    """Return the columns of names, which may be without the unit; InputError unless one each."""
+    columns: list[str] = []
+    for name in named:
+        indices = columns_named(table.names, name.strip())
+        if len(indices) != 1:
+            problem = "appears twice" if indices else "is missing"
+            raise table.error(name, f"{problem}; the file has: {', '.join(table.names)[:300]}")
+        column = table.names[indices[0]]
+        if column in columns:
+            raise table.error(column, "is named by columns.height for two places")
+        columns.append(column)
+    return columns
 
 
 def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:

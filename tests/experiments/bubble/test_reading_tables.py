@@ -143,6 +143,8 @@ def test_many_readings_are_averaged(tmp_path):
         ('files = ["h.csv"]\nplaces = [[120, 0]]', "expected places within"),
         ('files = ["bare.csv"]\nlength_unit = "mm"', "say pressure_unit"),
         ('files = ["h.csv"]\n[bubble.nuisance]\ntilt = 1.0', "nuisance.tilt: needs fields"),
+        ('files = ["h.csv"]\n[bubble.nuisance]\nshift = 1.0', "nuisance.shift: needs fields"),
+        ('files = ["h.csv"]\n[bubble.nuisance]\nturn = 5.0', "nuisance.turn: needs fields"),
         ('files = ["h.csv"]\n[bubble.sheet]\nconstant_field = ["dz"]', "sheet.constant_field"),
         ('files = ["h.csv"]\n[bubble.data.points]\nfiles = ["x.csv"]', "expected exactly one of"),
     ],
@@ -362,3 +364,51 @@ def test_profile_whose_pressure_scatters_is_used_whole(tmp_path):
     (tmp_path / "p.csv").write_text(f"pressure (kPa);x (mm);z (mm)\n{rows}\n")
     (series,) = bubble_of(tmp_path, PROFILES + 'files = ["p.csv"]\n').data.series
     assert len(series.value) == 30
+
+
+@pytest.mark.parametrize(
+    ("heading", "keys", "unit"),
+    [
+        ("Rx (mm)", "", "mm is no unit of curvature_is = 'curvature'"),
+        ("a (m)", 'curvature_is = "half"', "m is no unit of curvature_is = 'half'"),
+        ("Rx (1/m)", 'curvature_is = "radius"', "1/m is no unit of curvature_is = 'radius'"),
+        ("Rx", 'curvature_unit = "mm"', "mm is no unit of curvature_is = 'curvature'"),
+        (
+            "Rx",
+            'curvature_unit = "1/cm"\ncurvature_is = "radius"',
+            "1/cm is no unit of curvature_is = 'radius'",
+        ),
+    ],
+)
+def test_unit_of_a_curvature_must_go_with_what_it_is(tmp_path, heading, keys, unit):
+    (tmp_path / "a.csv").write_text(f"p (kPa);{heading}\n10;500\n20;400\n40;300\n")
+    text = f'{PROJECT}[bubble.data.apex]\nfiles = ["a.csv"]\n{keys}\n'
+    words = refusal(tmp_path, f'{text}columns = {{ curvature_warp = "{heading}" }}\n')
+    assert f"column '{heading}': {unit}" in words
+
+
+GAUGES = HEIGHTS + 'files = ["h.csv"]\nplaces = [[0, 0], [50, 0]]\n'
+
+
+def test_columns_of_gauges_may_be_named_without_their_units(tmp_path):
+    (tmp_path / "h.csv").write_text("p (kPa);h1 (mm);h2 (mm)\n10;9.6;7.3\n20;12;9.2\n")
+    for names in ('["h2", "h1"]', '["h2 (mm)", " h1 "]'):
+        away, apex = bubble_of(tmp_path, GAUGES + f"columns = {{ height = {names} }}\n").data.series
+        assert (away.value.tolist(), apex.value.tolist()) == ([7.3, 9.2], [9.6, 12])
+    one = GAUGES.replace(", [50, 0]", "") + 'columns = { height = "h2" }\n'
+    (series,) = bubble_of(tmp_path, one).data.series
+    assert series.value.tolist() == [7.3, 9.2]
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ('["h1", "h9 (mm)"]', "column 'h9 (mm)': is missing; the file has: p (kPa), h1 (mm)"),
+        ('["h1 (mm)", "h1 (mm)"]', "column 'h1 (mm)': is named by columns.height for two places"),
+        ('["h1", "h1 (mm)"]', "column 'h1 (mm)': is named by columns.height for two places"),
+        ('["h1", "h2"]', "column 'h2': appears twice"),
+    ],
+)
+def test_columns_of_gauges_that_are_not_one_each_are_refused(tmp_path, names, words):
+    (tmp_path / "h.csv").write_text("p (kPa);h1 (mm);h2 (mm);h2 (cm)\n10;9;7;7\n20;12;9;9\n")
+    assert words in refusal(tmp_path, GAUGES + f"columns = {{ height = {names} }}\n")
