@@ -3,6 +3,8 @@
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.bending import BendingObjective
 from bubblefit.materials.law import HypoelasticLaw, law_beside
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -108,3 +110,20 @@ def test_bending_that_cannot_be_fitted_is_refused(tmp_path, more, field):
     (tmp_path / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,1\n4,2\n")
     (tmp_path / "project.toml").write_text(PROJECT.format(more=more))
     assert field in complaint(bf.read_project, tmp_path / "project.toml")
+
+
+def test_loads_that_are_all_zero_are_refused(tmp_path):
+    (tmp_path / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,0\n4,0\n")
+    (tmp_path / "project.toml").write_text(PROJECT.format(more='measured.files = ["loads.csv"]'))
+    message = complaint(bf.read_project, tmp_path / "project.toml")
+    assert "measured.files: expected two or more loads between 0 and the last" in message
+
+
+def test_noise_that_is_not_stated_is_a_fiftieth_of_the_largest_load(tmp_path):
+    rows = "".join(f"{way},{3.0 * way}\n" for way in range(11))
+    (tmp_path / "loads.csv").write_text(f"deflection_mm,load_N\n{rows}")
+    (tmp_path / "project.toml").write_text(PROJECT.format(more='measured.files = ["loads.csv"]'))
+    (test,) = bf.read_project(tmp_path / "project.toml").tests.values()
+    objective = BendingObjective(test, Weighting())
+    assert (objective.least_noise, objective.noise_is) == (pytest.approx(0.6), "assumed")
+    assert objective.correlated_count == pytest.approx(2.0)  # ten loads, of which five count

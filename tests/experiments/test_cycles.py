@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
@@ -155,3 +156,15 @@ def test_help_lists_what_can_be_left_out(tmp_path):
     listed = re.search(r"Left out in turn: (.*?)\.", text).group(1)
     for sort in setup.tests[0].parts:
         assert sort in listed
+
+
+def test_finer_elements_of_a_bias_strip_are_not_those_of_finer_increments(tmp_path):
+    project = loops_project(tmp_path, 12, 9)
+    (test,) = project.tests.values()
+    specimen = replace(next(iter(test.matched.values())), direction="bias")
+    bias = replace(test, matched={"bias": specimen}, grip_distance=200.0)
+    plain, finer_increments, finer = (
+        len(bias.models(refined=refined, factor=factor)["bias"].mesh.quads)
+        for refined, factor in (("elements", 1.0), ("increments", 2.0), ("elements", 2.0))
+    )
+    assert (plain, finer_increments, finer) == (4 * 12, 4 * 12, 8 * 24)

@@ -17,6 +17,7 @@ from bubblefit.readers.tables import (
     padded,
     read_table,
     row_of,
+    seconds_of_stamps,
     split_cells,
 )
 from hypothesis import given
@@ -154,3 +155,21 @@ def test_decimal_mark_is_found(cells, mark):
         assert is_number(cell), cell
     for cell in ("", ".", "1.2.3", "1e", "e5", "1 2", "nan", "--1"):
         assert not is_number(cell), cell
+
+
+@pytest.mark.parametrize(
+    ("stamps", "seconds"),
+    [
+        (["00:00:00", "01:00:00", "23:59:59,5"], [0.0, 3600.0, 86399.5]),
+        (["12:00:00 AM", "1:01:01 a.m.", "12:30:00 PM", "1:00:00 p.m."], [0, 3661, 45000, 46800]),
+        (["23:00:00", "01:00:00", "23:30:00", "00:30:00"], [82800, 90000, 171000, 174600]),
+        (["2021-03-31T23:00:00Z", "2021-04-02T01:00:00Z"], [82800, 176400]),
+    ],
+)
+def test_stamps_are_seconds_since_midnight_of_the_first_day(stamps, seconds):
+    assert seconds_of_stamps(stamps).tolist() == seconds
+
+
+def test_stamps_of_which_some_have_dates_are_refused():
+    with pytest.raises(ValueError, match="dates before some of the times only"):
+        seconds_of_stamps(["2021-03-31 23:00:00", "23:00:01"])

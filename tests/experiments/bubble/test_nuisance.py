@@ -1,6 +1,7 @@
 """experiments/bubble/nuisance.py: fitted registration, noise of a measured sheet."""
 
 import functools
+from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
@@ -192,6 +193,14 @@ def test_errors_of_a_registration_are_tilts_shifts_and_a_turn(registered):
         history, nuisance
     )
     assert columns[:, 4] == pytest.approx(change, abs=1e-3 * np.abs(change).max())
+
+
+def test_registration_without_a_rim_has_no_errors_of_shifts(registered):
+    comparison, law, nuisance, history, registration = registered
+    errors = replace(comparison.shared_errors, registration=replace(registration, rim=None))
+    whole = comparison.shared_errors(comparison, law, nuisance, history).changes.toarray()
+    without_rim = errors(comparison, law, nuisance, history).changes.toarray()
+    assert without_rim == pytest.approx(whole[:, [0, 1, 4]])
 
 
 @pytest.fixture(scope="module")

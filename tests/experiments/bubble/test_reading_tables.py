@@ -232,6 +232,21 @@ def test_profiles_of_named_specimens_are_kept_apart(tmp_path):
     assert of_files.specimens.tolist() == series.specimens.tolist()
 
 
+def test_specimens_of_profiles_along_both_axes_are_kept_apart(tmp_path):
+    rows = [
+        f"{name},{axis},10,{s},{h * (1 - (s / 100) ** 2)}"
+        for axis in ("x", "y")
+        for name, h in (("S1", 10.0), ("S2", 11.0))
+        for s in range(-90, 91, 3)
+    ]
+    heading = "Specimen,axis,p (kPa),s (mm),dz (mm)\n"
+    (tmp_path / "p.csv").write_text(heading + "\n".join(rows))
+    test = bubble_of(tmp_path, f'{PROJECT}[bubble.data.profiles]\nfiles = ["p.csv"]\n')
+    assert [s.label for s in test.data.series] == ["heights along x", "heights along y"]
+    for series in test.data.series:
+        assert series.specimens.tolist() == [0] * 40 + [1] * 40
+
+
 @pytest.mark.parametrize(
     ("keys", "column", "factor"),
     [

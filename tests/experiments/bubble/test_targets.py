@@ -16,6 +16,7 @@ from bubblefit.experiments.bubble.targets import (
     at_points,
     counted_from,
     resampled,
+    with_place_numbers,
     with_unloaded_positions,
 )
 from bubblefit.materials.law import HypoelasticLaw
@@ -53,6 +54,17 @@ def test_targets_keep_their_places_on_another_mesh():
     np.testing.assert_allclose(
         every.at_places(FINE_DISK.points)[inside], COARSE_DISK.points[inside], atol=1e-9
     )
+
+
+def test_places_of_a_micrometre_are_one_and_have_its_number():
+    nodes = COARSE_DISK.points[:, :2]
+    one = FieldTarget(0.1, np.zeros((len(nodes), 3)))
+    for shift, is_same in ((4e-4, True), (2e-3, False)):
+        shifted = sp.csr_matrix(np.eye(len(nodes))[[7, 3]] * (1.0 + shift / nodes[7, 0]))
+        targets = [one, FieldTarget(0.2, np.zeros((2, 3)), shifted)]
+        first, second = (t.place_numbers for t in with_place_numbers(targets, np.round(nodes)))
+        assert len(np.unique(first)) == len(nodes)
+        assert bool(second[0] == first[7]) is is_same
 
 
 FILTER = "[bubble.data.points.filter]\nfacet = 40.0\nsmoothing = 3\nstep = 10.0\n"

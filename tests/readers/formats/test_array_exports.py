@@ -127,6 +127,20 @@ def test_multidic_of_other_shapes_is_refused(tmp_path):
         assert said.endswith(f"a.mat: Points3D and DispVec are {places} and {moved}")
 
 
+def test_multidic_has_a_frame_for_each_cell(tmp_path):
+    cells = {name: np.empty((2, 1), dtype=object) for name in ("points", "vectors")}
+    for k in (0, 1):
+        cells["vectors"][k, 0] = k * ARRAY_DISPLACEMENT
+        cells["points"][k, 0] = ARRAY_PLACES + k * ARRAY_DISPLACEMENT
+    results = {"Points3D": cells["points"], "Disp": {"DispVec": cells["vectors"]}}
+    savemat(tmp_path / "a.mat", {"DIC3DPPresults": results})
+    frames = read_frames([tmp_path / "a.mat"])
+    for k, frame in enumerate(frames):
+        np.testing.assert_allclose(frame.points, ARRAY_PLACES, atol=1e-12)
+        np.testing.assert_allclose(frame.displacement, k * ARRAY_DISPLACEMENT)
+    assert len(frames) == 2
+
+
 def ncorr(path: Path, u, v, spacing=4.0, pixel=0.1, coefficient=None):
     fields = {"plot_u_ref_formatted": u, "plot_v_ref_formatted": v}
     if coefficient is not None:
@@ -146,6 +160,11 @@ def test_ncorr_takes_correlated_points_in_its_grid(tmp_path):
     frame = ncorr(path, u, v)
     np.testing.assert_allclose(frame.points, [[0.5, 0, 0], [0, -0.5, 0]])
     np.testing.assert_allclose(frame.displacement, [[-0.2, 0, 0], [0, 0.4, 0]])
+    # A point that moves along one axis only, to either side, is correlated.
+    only_u = ncorr(path, np.array([[0.3, -0.2], [0.0, 0.0]]), np.zeros((2, 2)))
+    only_v = ncorr(path, np.zeros((2, 2)), np.array([[0.3, -0.2], [0.0, 0.0]]))
+    assert only_u.displacement[:, 0].tolist() == [0.3, -0.2]
+    assert only_v.displacement[:, 1].tolist() == [-0.3, 0.2]
     # Its own coefficient says better where a point did not move.
     frame = ncorr(path, u, v, coefficient=np.array([[0.0, 0.1], [0.0, 0.1]]))
     np.testing.assert_allclose(frame.points, [[0.5, 0, 0], [0.5, -0.5, 0]])
