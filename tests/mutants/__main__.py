@@ -91,10 +91,21 @@ def cosmic_ray(arguments: Sequence[str], copy: Path, end: float) -> bool:
             return False
 
 
+def _place_and_change(item: WorkItem) -> tuple[str, tuple[int, int], str, int]:
+    """Return where a mutant is in the code, and what it changes there."""
+    mutation = item.mutations[0]
+    place = str(mutation.module_path), mutation.start_pos
+    return *place, mutation.operator_name, mutation.occurrence
+
+
 def drawn(items: Sequence[WorkItem], seed: int, number: int | None) -> dict[str, list[WorkItem]]:
-    """Return `number` mutants by file, in random order: one of a place in the code at most."""
+    """Return `number` mutants by file, in random order: one of a place in the code at most.
+
+    The same seed draws the same mutants of the same code, in whatever order the database has them.
+    """
     places = {}
-    for item in Random(seed).sample(items, len(items)):
+    in_order = sorted(items, key=_place_and_change)
+    for item in Random(seed).sample(in_order, len(in_order)):
         mutation = item.mutations[0]
         if not LEFT_OUT.match(mutation.operator_name):
             places.setdefault((str(mutation.module_path), mutation.start_pos), item)

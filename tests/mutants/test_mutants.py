@@ -28,6 +28,7 @@ def test_one_mutant_per_place_is_drawn():
     assert sorted(one.mutations[0].start_pos[0] for one in drawn) == list(range(9))
     assert mutants.drawn(items, 1, 4) == mutants.drawn(items, 1, 4) != mutants.drawn(items, 2, 4)
     assert len(mutants.drawn(items, 1, 4)["a.py"]) == 4
+    assert mutants.drawn(items[::-1], 1, 4) == mutants.drawn(items, 1, 4)
 
 
 def test_test_file_of_its_name_comes_first_then_those_that_import_it():

@@ -151,3 +151,22 @@ def test_hdf5_members_and_their_sizes(tmp_path, monkeypatch):
         assert f"{path}: n: says it holds (4,)" in complaint(array_of, path, numbers, "n")
     path.write_bytes(b"no such thing")
     assert f"{path}: cannot be read as HDF5" in complaint(open_hdf5(path).__enter__)
+
+
+@pytest.mark.parametrize("depth", [16, 17])
+def test_cells_within_each_other_are_read_to_a_depth_of_sixteen(tmp_path, depth):
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        item = file.create_dataset("#refs#/0", data=[[4.0]])
+        for number in range(1, depth):
+            item = file.create_dataset(f"#refs#/{number}", (1, 1), h5py.ref_dtype, item.ref)
+        file.create_dataset("X", (1, 1), h5py.ref_dtype, item.ref)
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    if depth > 16:
+        assert "has too many parts" in complaint(read_variables, path, ["X"])
+        return
+    value = read_variables(path, ["X"])["X"]
+    for _ in range(depth):
+        (value,) = value
+    assert value.tolist() == [[4.0]]
