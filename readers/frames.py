@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, check_one_of
 from ..notes import Note, NoteKind
-from .quantities import LENGTHS, PIXELS
+from .quantities import LENGTHS, PIXELS, is_of_no_length
 from .registry import read_file
 
 ORDER = NoteKind("order of frames")
@@ -373,11 +373,16 @@ def _in_mm(
     options: FrameOptions,
     path: Path | None,
 ) -> Array:
-    """Return a column (n,) in mm, by its unit or the options' scale; InputError for pixels."""
-    unit = rows.units.get(name, "").casefold()
+    """Return a column (n,) in mm, by its unit or the options' scale; InputError for no length."""
+    unit = rows.units.get(name, "").strip().casefold()
+    column = f"column {rows.names[name]!r}"
     if unit in PIXELS:
         problem = f"is in pixels; export lengths, or name a column of {name} in mm with columns"
-        raise InputError(path, f"column {rows.names[name]!r}", problem)
+        raise InputError(path, column, problem)
+    if is_of_no_length(unit):
+        problem = f"expected a unit of mm, cm, m, µm, in, mil and ft, got {rows.units[name]!r}"
+        advice = "convert the lengths, or take what is no unit off the heading"
+        raise InputError(path, column, f"{problem}; {advice}")
     scale = LENGTHS.get(unit, options.length_scale)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(rows.values[name] * scale)

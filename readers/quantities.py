@@ -208,9 +208,10 @@ def is_between_grips(name: str, is_chosen: bool) -> bool:
 #: mm in one of each unit of length, by its name in small letters.
 LENGTHS = {
     **dict.fromkeys(("mm", "millimeter", "millimetre", "millimeters", "millimetres"), 1.0),
-    **dict.fromkeys(("cm", "centimeter", "centimetre"), 10.0),
+    **dict.fromkeys(("cm", "centimeter", "centimetre", "centimeters", "centimetres"), 10.0),
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e3),
-    **dict.fromkeys(("µm", "μm", "um", "micron", "microns", "micrometer", "mikrometer"), 1e-3),
+    **dict.fromkeys(("µm", "μm", "um", "micron", "microns", "micrometer", "micrometre"), 1e-3),
+    **dict.fromkeys(("micrometers", "micrometres", "mikrometer"), 1e-3),
     **dict.fromkeys(("in", "inch", "inches", "zoll", '"', "″"), 25.4),
     **dict.fromkeys(("mil", "mils", "thou"), 0.0254),
     **dict.fromkeys(("ft", "foot", "feet"), 304.8),
@@ -242,6 +243,7 @@ _FLAGS_AND_SIGMA = {
     **dict.fromkeys(("invalid", "rejected", "doubtful", "ungültig"), "invalid"),
 }
 _UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGNORECASE)
+_WORD_IN_BRACKETS = re.compile(r"^(.*?)[\s_]*[(\[<{]\s*(\w+)\s*[)\]>}]$")
 
 
 @dataclass(frozen=True)
@@ -286,14 +288,23 @@ def heading_of(name: str, unit: str = "") -> Heading:
         return Heading(name, unit, "")
     plain, unit_in_name = split_unit(name)
     at_the_end = _UNIT_AT_THE_END.match(name)
+    in_brackets = _WORD_IN_BRACKETS.match(name)
     if at_the_end and not unit_in_name:
         plain, unit_in_name = at_the_end.groups()
+    elif in_brackets and in_brackets[2].casefold() in LENGTHS:
+        plain, unit_in_name = in_brackets.groups()
     unit = unit_in_name or unit
     words = [word for word in re.split(r"[\W_]+", plain.casefold()) if word]
     quantity = _quantity_beside_components(words)
     if quantity:
         return Heading(name, unit, quantity)
     return Heading(name, unit, *_component(words, unit.casefold()))
+
+
+def is_of_no_length(unit: str) -> bool:
+    """Return whether a unit is none of lengths, nor a word such as "ref" or "x" in its place."""
+    words = set(re.findall(r"[^\W\d_]{2,}|[%‰°]", unit.casefold()))
+    return unit.casefold() not in LENGTHS and not words <= _OF_COMPONENTS.union(_AXES)
 
 
 def _quantity_beside_components(words: list[str]) -> str:

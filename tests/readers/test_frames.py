@@ -43,6 +43,34 @@ def test_lengths_become_mm_by_the_unit_of_their_column():
     )
 
 
+@pytest.mark.parametrize("unit", ["dm", "nm", "yd", "%", "kPa", "voxel", "mm/mm"])
+def test_columns_that_are_named_and_in_no_known_length_are_refused(tmp_path, unit):
+    path = tmp_path / "t_1.csv"
+    path.write_text(f"x [mm],y [mm],z [mm],dx [{unit}],dy [mm],dz [mm]\n1,2,3,4,5,6\n")
+    columns = FrameOptions(columns={"dx": f"dx [{unit}]"})
+    words = f"column 'dx [{unit}]': expected a unit of mm, cm, m, µm, in, mil and ft, got '{unit}'"
+    assert words in complaint(read_frames, [path], columns)
+
+
+@pytest.mark.parametrize("word", ["ref", "Deformed", "x", "1"])
+def test_words_in_brackets_that_are_no_unit_leave_the_unit_open(tmp_path, word):
+    path = tmp_path / "t_1.csv"
+    path.write_text(f"X ({word}),y,z,dx,dy,dz\n1,2,3,4,5,6\n")
+    options = FrameOptions(columns={"x": f"X ({word})"}, length_scale=10.0)
+    (frame,) = read_frames([path], options)
+    np.testing.assert_array_equal(frame.points, [[10, 20, 30]])
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_long_words_of_units_in_brackets_are_read(tmp_path, is_named):
+    path = tmp_path / "t_1.csv"
+    names = {name: f"{name} [micrometers]" for name in FRAME_NAMES}
+    path.write_text(",".join(names.values()) + "\n1,2,3,4,5,6\n")
+    (frame,) = read_frames([path], FrameOptions(columns=names if is_named else None))
+    np.testing.assert_allclose(frame.points, [[1e-3, 2e-3, 3e-3]])
+    np.testing.assert_allclose(frame.displacement, [[4e-3, 5e-3, 6e-3]])
+
+
 def test_dropped_rows_are_counted_by_their_first_reason():
     values = {name: np.append(value, [7.0, 0.0, 8.0]) for name, value in FRAME_VALUES.items()}
     dropped = {"without a value": 3, "flagged as doubtful": 1, "never": 0}

@@ -44,7 +44,7 @@ def test_heading_has_quantity_and_state(name, unit, quantity, state):
 
 def test_units_of_headings_are_found():
     scales = {"mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "um": 1e-3, "in": 25.4, "INCH": 25.4}
-    scales |= {'"': 25.4, "mil": 0.0254}
+    scales |= {'"': 25.4, "mil": 0.0254, "Centimeters": 10.0, "micrometres": 1e-3}
     for unit, scale in scales.items():
         assert heading_of("x", unit).scale == scale
         assert heading_of(f"x [{unit}]", "mm").scale == scale  # the name's own comes first
