@@ -105,7 +105,8 @@ def divided(steps: Sequence[float], factor: float, owner: str) -> list[float]:
     if factor != int(factor):
         problem = f"the {owner}'s steps are divided, never joined: use --coarser 0"
         raise InputError(None, "increments", problem)
-    parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise((0.0, *steps))]
+    count = int(factor) + 1
+    parts = [np.linspace(a, b, count)[1:] for a, b in pairwise((0.0, *steps))]
     return [float(value) for part in parts for value in part]
 
 

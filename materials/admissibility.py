@@ -142,7 +142,8 @@ def closed_path(
     a, b = ends or [end if end < UNLIMITED else DEFAULT_END for end in range_ends]
     first_loading = law if law.memory is None else replace(law, memory=None)
     shares = np.arange(1, increments + 1)[:, None] / increments
-    corners = [np.array([*corner, 0.0]) for corner in ((0, 0), (a, 0), (a, b), (0, b), (0, 0))]
+    strains = ((0, 0), (a, 0), (a, b), (0, b), (0, 0))
+    corners = [np.array([*corner, 0.0]) for corner in strains]
     path = np.concatenate([start + shares * (end - start) for start, end in pairwise(corners)])
     work = _work(first_loading.compiled, path)
     share = work.sum() / work[: 2 * increments].sum()

@@ -99,7 +99,8 @@ class DesignersConstants:
     def stable(self) -> bool:
         """Return whether every stretch takes work: nu_warp nu_fill < 1 if reciprocal."""
         c = self.compliance
-        return bool(c[0, 0] * c[1, 1] > (0.5 * (c[0, 1] + c[1, 0])) ** 2)
+        coupling = 0.5 * (c[0, 1] + c[1, 0])
+        return bool(c[0, 0] * c[1, 1] > coupling**2)
 
     def strain(self, loads: ArrayLike) -> Array:
         """Return (n, 2) of loads (n, 2) kN/m."""

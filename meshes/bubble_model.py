@@ -218,7 +218,9 @@ class BubbleModel:
         yarns = self.mesh.warp
         if turn := values.get(TURN, 0.0):
             x, y, z = np.eye(3)[0] if yarns is None else yarns.T
-            rotated = [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
+            cos = np.cos(turn)
+            sin = np.sin(turn)
+            rotated = [x * cos - y * sin, x * sin + y * cos, z]
             yarns = np.array(np.broadcast_to(np.stack(rotated, axis=-1), (len(self.mesh.quads), 3)))
         return replace(
             self,

@@ -254,9 +254,8 @@ def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[f
 
 #: Side of the square patch in mm; results do not depend on it.
 SIDE = 100.0
-SQUARE = Mesh(
-    SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2, 3]]), {}
-)
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+SQUARE = Mesh(SIDE * CORNERS, np.array([[0, 1, 2, 3]]), {})
 #: Supports of the patch: the edges x = 0 and y = 0 stay in their lines.
 ROLLERS_PATCH: Mapping[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_y": (1,)}
 #: Node sets of the edges that are pulled, along x and along y.
@@ -350,7 +349,10 @@ class TubeModel(WithThicknessParameter):
             Of the patch's corners.
         """
         u = np.asarray(displacement, dtype=float) / SIDE
-        return np.stack([u[:, 1, 0], u[:, 3, 1], u[:, 1, 1] / (1.0 + u[:, 3, 1])], axis=1)
+        along = u[:, 1, 0]
+        across = u[:, 3, 1]
+        shear = u[:, 1, 1] / (1.0 + across)
+        return np.stack([along, across, shear], axis=1)
 
     def strain_slopes(self, displacement: ArrayLike, slope: ArrayLike) -> Array:
         """Return the derivatives (n, 3, parameters) of `strains`.

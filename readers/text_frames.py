@@ -271,7 +271,12 @@ def number_cells(
     """Return line, column and text of cells that should be numbers, of the first rows."""
     indices = [i for key in columns if key not in ("valid", "invalid") for i in columns[key]]
     rows = [row_of(*line, separator) for line in body[:MARK_ROWS]]
-    return [(r.line, names[i], r.cells[i]) for r in rows for i in indices if i < len(r.cells)]
+    return [
+        (row.line, names[index], row.cells[index])
+        for row in rows
+        for index in indices
+        if index < len(row.cells)
+    ]
 
 
 # Columns ----------------------------------------------------------------------------------------

@@ -138,7 +138,9 @@ def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
     order = np.argsort(x, kind="stable")
     x = x[order]
     y = np.array(load, dtype=float, ndmin=1)[order]
-    return (np.r_[0.0, x], np.r_[0.0, y]) if len(x) and x[0] > 0 else (x, y)
+    if len(x) and x[0] > 0:
+        return np.r_[0.0, x], np.r_[0.0, y]
+    return x, y
 
 
 def _at(curve: Curve, elongation: Array) -> Array:

@@ -358,8 +358,11 @@ def _plot_size(
     if not chart.equal:
         return width, 210
     # Within a box of the plot's width, and of one and a half times that as height at most.
-    unit = min(width / (x[1] - x[0]), min(1.5 * width, FULL_HEIGHT) / (y[1] - y[0]))
-    return unit * (x[1] - x[0]), unit * (y[1] - y[0])
+    span = x[1] - x[0]
+    rise = y[1] - y[0]
+    largest_height = min(1.5 * width, FULL_HEIGHT)
+    unit = min(width / span, largest_height / rise)
+    return unit * span, unit * rise
 
 
 def _add_shades(spec: Spec, chart: Chart, height: float) -> None:
@@ -509,9 +512,10 @@ def _data(name: str, series: Series) -> Spec:
     """Return a series as Vega's data: a row for each face; else one row, which Vega unrolls."""
     if series.look == "faces":
         k = len(series.x) // max(len(series.values), 1)
+        faces = [slice(k * n, k * n + k) for n in range(len(series.values))]
         rows = [
-            {"x": series.x[k * n : k * n + k], "y": series.y[k * n : k * n + k], "values": value}
-            for n, value in enumerate(series.values)
+            {"x": series.x[face], "y": series.y[face], "values": value}
+            for face, value in zip(faces, series.values, strict=True)
         ]
         return {"name": name, "values": rows}
     columns = {}

@@ -74,7 +74,8 @@ def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
     """Return the value at size zero by extrapolation from the two finest levels, (2,) each."""
     h = np.asarray(sizes, dtype=float)
     f = np.asarray(values, dtype=float)
-    return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
+    ratio = h[0] / h[1]
+    return float(f[1] + (f[1] - f[0]) / (ratio**order - 1.0))
 
 
 def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 0.0) -> Convergence:

@@ -333,8 +333,11 @@ def _longest(strain: Array, chosen: Flags) -> Span | None:
         Which of them are meant.
     """
     # Where a run of chosen strains begins, and the index after its last one, in turn.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
-    spans = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
+    padded = np.concatenate([[0], chosen.astype(int), [0]])
+    edges = np.flatnonzero(np.diff(padded))
+    lowest = strain[edges[::2]].tolist()
+    highest = strain[edges[1::2] - 1].tolist()
+    spans = list(zip(lowest, highest, strict=True))
     longest = max(spans, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
     return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
 

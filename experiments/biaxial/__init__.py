@@ -279,8 +279,13 @@ class BiaxialTest(SectionTest):
     def pace(self) -> Pace:
         """Return the pace of the test, from the larger load and larger strain over time."""
         return pace_of(
-            LoadHistory(t.path or Path(t.name), t.load.max(axis=1), t.strain.max(axis=1), t.time)
-            for t in self.tables
+            LoadHistory(
+                table.path or Path(table.name),
+                table.load.max(axis=1),
+                table.strain.max(axis=1),
+                table.time,
+            )
+            for table in self.tables
         )
 
     @property

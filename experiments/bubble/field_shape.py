@@ -323,9 +323,9 @@ def smooth_strains(
         eps1 along the warp, eps2 along the fill, and the engineering shear gamma12 of each field.
     """
     smooth = SmoothField.through(positions, np.column_stack([heights, *displacements]))
-    height_slope, *slopes = np.split(
-        np.stack(smooth.slopes(), axis=-1), np.arange(1, 1 + 3 * len(displacements), 3), axis=1
-    )
+    all_slopes = np.stack(smooth.slopes(), axis=-1)
+    first_rows = np.arange(1, 1 + 3 * len(displacements), 3)
+    height_slope, *slopes = np.split(all_slopes, first_rows, axis=1)
     tangents = np.tile(np.eye(3, 2), (len(positions), 1, 1))
     tangents[:, 2] = height_slope[:, 0]
     return [strain_of_tangents(tangents, tangents + slope, warp) for slope in slopes]

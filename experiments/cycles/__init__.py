@@ -180,9 +180,8 @@ def _averages(strain: Array, load: Array, increments: int) -> list[tuple[float, 
     share = np.clip((strain - strain[0]) / (strain[-1] - strain[0] or 1.0), 0.0, 1.0)
     part = np.minimum((increments - 1) * share, increments - 1.5).astype(int)
     part[-1] = increments - 1
-    return [
-        (float(strain[part == k].mean()), float(load[part == k].mean())) for k in np.unique(part)
-    ]
+    masks = [part == k for k in np.unique(part)]
+    return [(float(strain[mask].mean()), float(load[mask].mean())) for mask in masks]
 
 
 def _predictable_cycles(evaluated: EvaluatedHistory) -> tuple[int, ...]:

@@ -200,7 +200,9 @@ def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
     y = load[is_between]
     if len(x) < 3 or not np.ptp(x) > 0:
         return math.nan
-    return float(((x - x.mean()) * (y - y.mean())).sum() / ((x - x.mean()) ** 2).sum())
+    x = x - x.mean()
+    y = y - y.mean()
+    return float((x * y).sum() / (x**2).sum())
 
 
 def evaluate_cycle(

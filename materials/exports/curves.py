@@ -57,7 +57,8 @@ def from_zero(rows: Array) -> Array:
     rows : (n, 2) array
         Strain and stress (MPa) of the curve, from the permanent set on.
     """
-    return np.vstack([np.zeros((1, 2)), [[rows[0, 0], 0.0]], rows[1:]])
+    permanent_set = [rows[0, 0], 0.0]
+    return np.vstack([[0.0, 0.0], permanent_set, rows[1:]])
 
 
 def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> base.Export:

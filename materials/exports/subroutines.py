@@ -155,7 +155,8 @@ def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export
 
 def guarded(table: ModulusTable) -> list[list[float]]:
     """Return strain and modulus of a table, and one point more beyond each end."""
-    rows = np.pad(np.column_stack([table.strain, table.modulus]), ((1, 1), (0, 0)), "edge")
+    rows = np.column_stack([table.strain, table.modulus])
+    rows = np.pad(rows, ((1, 1), (0, 0)), "edge")
     rows[[0, -1], 0] += [-GUARD, GUARD]
     numbers: list[list[float]] = rows.tolist()
     return numbers

@@ -101,7 +101,8 @@ class Spline(base.LawForm):
 
     def uppers(self) -> Array:
         count = max(len(row) for row in self.knots)
-        return np.array([[*row[1:], *[UNLIMITED] * (count + 1 - len(row))] for row in self.knots])
+        repeated = [[UNLIMITED] * (count + 1 - len(row)) for row in self.knots]
+        return np.array([[*row[1:], *ends] for row, ends in zip(self.knots, repeated, strict=True)])
 
     def grid(self, component: int, end: float) -> Array:
         ends = [*(knot for knot in self.knots[component] if knot < end), end]
@@ -462,7 +463,9 @@ class Form:
             tolerance = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
             ends = [0.0, *sorted(b for b in self.breaks if 0 < b < end), end]
             parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, tolerance)]
-            parts.append((UNLIMITED, np.eye(4)[:, 3:] @ np.vander([end], 4) @ parts[-1][1]))
+            # Beyond the range the modulus is constant.
+            last_values = np.vander([end], 4) @ parts[-1][1]
+            parts.append((UNLIMITED, np.eye(4)[:, 3:] @ last_values))
             count = len(tolerance)
             own_labels = self.labels.get(name) or [f"{name} {k + 1}" for k in range(count)]
             if len(own_labels) != count:

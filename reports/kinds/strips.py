@@ -466,7 +466,8 @@ def _count_within_range(model: UniaxialModel, card: MaterialCard, history: Histo
     """Return the number of increments before the strain leaves the card's valid range."""
     for i, u in enumerate(history.displacement):
         strain = surface_strain(model.mesh, u, model.warp)
-        reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
+        shear = np.abs(strain[:, 2]).max()
+        reached = np.array([*strain[:, :2].max(axis=0), shear])
         if (reached > card.law.strain_range * (1 + 1e-6)).any():
             return i
     return len(history.load)

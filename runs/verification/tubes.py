@@ -53,8 +53,10 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
         return wall_force - np.pi * radius**2 * PRESSURE
 
     t = scipy.optimize.brentq(excess_force, 0.0, 3.1)
-    moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
-    return t / np.pi, moment
+    taut = np.pi - t
+    moment = 2 * taut + np.sin(2 * t)
+    force = np.sin(t) + taut * np.cos(t)
+    return t / np.pi, moment / (4 * force)
 
 
 class TubeWithPlaneEnds:

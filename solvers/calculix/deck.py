@@ -341,7 +341,8 @@ def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
     """Return a note where a slope s of the sheet, by 2 s^2, costs it over 2 % of its stiffness."""
     corner = shells.points[shells.elements[:, :4]]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-    slope = (np.hypot(normal[:, 0], normal[:, 1]) / np.abs(normal[:, 2])).max()
+    horizontal = np.hypot(normal[:, 0], normal[:, 1])
+    slope = (horizontal / np.abs(normal[:, 2])).max()
     if slope <= STEEP:
         return ()
     lower = f"the sheet's slopes of up to {slope:.2f} lower its stiffness there by up to"

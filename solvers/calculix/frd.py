@@ -184,7 +184,9 @@ class FrdFile:
         for i, (n, size) in enumerate(zip(lines, sizes, strict=True)):
             rows = table[:, start : start + size]
             key = b" -1" if i == 0 else b" -2"
-            if (rows[:, :3] != np.frombuffer(key, np.uint8)).any() or (rows[:, -1] != 10).any():
+            has_key = (rows[:, :3] == np.frombuffer(key, np.uint8)).all()
+            ends_in_newline = (rows[:, -1] == ord("\n")).all()
+            if not (has_key and ends_in_newline):
                 raise self._wrong("a data line that is too short or too long")
             parts.append(self._numbers(rows[:, 3 + digits : -1], 12, float).reshape(count, n))
             start += size

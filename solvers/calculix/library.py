@@ -61,7 +61,8 @@ def _numbers(law: HypoelasticLaw) -> str:
     if law.of_load_ratio:  # gains of E1 and E2, then T1, T2 and S
         numbers += [*law.coupling[1:], *[0.0] * 3][:5]
     rows = [[f"{count:.0f}" for count in counts]]
-    rows += [[repr(float(x)) for x in numbers[i : i + 5]] for i in range(0, len(numbers), 5)]
+    words = [repr(float(x)) for x in numbers]
+    rows += [words[i : i + 5] for i in range(0, len(words), 5)]
     return "".join(" ".join(row) + "\n" for row in rows)
 
 

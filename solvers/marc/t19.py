@@ -251,7 +251,8 @@ class T19File:
         values = self._file.parse(places, count * coordinates, float).reshape(count, coordinates)
         if not (np.diff(numbers) > 0).all():
             raise self._file.wrong("node numbers do not increase")
-        return numbers.astype(np.int64), np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
+        points = np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
+        return numbers.astype(np.int64), points
 
 
 def read_last_frame(path: Path) -> Any:

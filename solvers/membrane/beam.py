@@ -206,7 +206,8 @@ class Beam:
         """Return the displacement (nodes, 3) mm of the model's surface mesh at the state x."""
         p = self.model.mesh.points
         q = x[: 3 * len(self.s)].reshape(-1, 3)
-        along, up, rotation = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
+        axial_position = p[:, 2]
+        along, up, rotation = (np.interp(axial_position, self.s, column) for column in q.T)
         upward = up + p[:, 1] * (np.cos(rotation) - 1.0)
         axial = along - p[:, 1] * np.sin(rotation)
         return np.column_stack([np.zeros(len(p)), upward, axial])

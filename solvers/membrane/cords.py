@@ -225,7 +225,9 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
         x, y = (p[:, :2] - cord.ends[0]).T
         length = float(np.linalg.norm(cord.ends[1] - cord.ends[0]))
         c, s = (cord.ends[1] - cord.ends[0]) / length
-        crossed, b = _crossed((c * y - s * x)[q], (c * x + s * y)[q], (0.0, length))
+        aside = c * y - s * x
+        along = c * x + s * y
+        crossed, b = _crossed(aside[q], along[q], (0.0, length))
         if not len(crossed) and not model.halved:
             raise InputError(
                 None, f"cord[{number}].ends", "expected a line on the sheet, not beside it"
@@ -295,7 +297,9 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
     # Between nodes at distances a and b, the line crosses the edge at the fraction a / (a - b).
     rows = np.arange(len(crossed))
     edge_weights = []
-    for first in (np.argmax(cut, axis=1), 3 - np.argmax(cut[:, ::-1], axis=1)):
+    first_cut = np.argmax(cut, axis=1)
+    last_cut = 3 - np.argmax(cut[:, ::-1], axis=1)
+    for first in (first_cut, last_cut):
         second = (first + 1) % 4
         a = aside[rows, first]
         b = aside[rows, second]
