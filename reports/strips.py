@@ -44,7 +44,7 @@ class StripCurves:
         Polynomial fitted to the points, at increasing elongations.
     scatter : float or None, N
         Standard deviation of the specimens' loads about the polynomial.
-    rms : sequence of float, N
+    rms : sequence of float or None, N
         RMS error of the load of each model in turn (Eqs 3.4 to 3.6 of the thesis), as far as
         known.
     """
@@ -54,7 +54,7 @@ class StripCurves:
     points: Curve | None = None
     polynomial: Curve | None = None
     scatter: float | None = None
-    rms: Sequence[float] = ()
+    rms: Sequence[float | None] = ()
 
 
 def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
@@ -92,7 +92,7 @@ def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
         series.append(line(name, *curve, colour=(rank + 1) % 6, dashes=rank // 6))
     title = TITLES.get(strip.direction, strip.direction)
     alt = f"{title}; load over elongation, measured and modelled"
-    if len(strip.rms) == 1:
+    if len(strip.rms) == 1 and strip.rms[0] is not None:
         title += f": RMS error {strip.rms[0]:.3g} N"
         if strip.scatter is not None:
             title += f", scatter {strip.scatter:.3g} N"
@@ -126,10 +126,10 @@ def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
 
 
 def _errors(strip: StripCurves) -> str:
-    """Return the RMS errors of the models in words, "" where fewer than two are known."""
+    """Return the RMS errors of several models in words, "" where none is known."""
     models = zip(strip.models, strip.rms, strict=False)
-    errors = [f"{name} {rms:.3g} N" for (name, *_), rms in models]
-    return f": RMS error {', '.join(errors)}" if len(errors) > 1 else ""
+    errors = [f"{name} {rms:.3g} N" for (name, *_), rms in models if rms is not None]
+    return f": RMS error {', '.join(errors)}" if errors and len(strip.rms) > 1 else ""
 
 
 def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:

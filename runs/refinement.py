@@ -23,7 +23,7 @@ from ..materials.forms.base import Array
 from ..meshes.mesh import Mesh
 from ..notes import Note, Verdict, as_note
 from ..project.project import Project
-from .convergence import convergence, observed_order
+from .convergence import Convergence, convergence, observed_order
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .progress import Listener
@@ -320,16 +320,34 @@ def _quantity_numbers(
         if level.factor == 1 and of_project is None:
             of_project = level.values[name]
     observed = convergence(sizes, values, noise)
-    best = finest if observed.limit is None else observed.limit
     return {
         "finest": finest,
         "order": observed.order,
         "order_one_coarser": observed.previous,
         "limit": observed.limit,
         "remark": observed.remark,
-        "own_error": None if of_project is None else of_project / best - 1.0,
+        "own_error": _error_of_project(of_project, observed, values, noise),
         "own_error_against": "finest" if observed.limit is None else "limit",
     }
+
+
+def _error_of_project(
+    of_project: float | None, observed: Convergence, values: Sequence[float], noise: float
+) -> float | None:
+    """Return the relative error of the project's level against the limit or the finest level.
+
+    None is returned if it is not known: of a project that is the finest level itself, unless that
+    and the next coarser one agree to the accuracy of the solver.
+    """
+    if of_project is None:
+        return None
+    if observed.limit is not None:
+        return of_project / observed.limit - 1.0
+    changes = np.abs(np.diff(values[-2:]))
+    agree = len(changes) > 0 and changes[0] <= noise * np.abs(values).max()
+    if of_project == values[-1] and not agree:
+        return None
+    return of_project / values[-1] - 1.0
 
 
 def ended(levels: Sequence[Level]) -> list[Level]:

@@ -682,7 +682,9 @@ class Fit(Reported):
         for key, rows in groups:
             labels = [str(label) for label in key]
             table = rows.dropna(axis="columns", how="all")
-            if {"x_mm", "y_mm"} <= {*table}:  # of a surface, which is no curve but at one point
+            if {"x_mm", "y_mm", "frame"} <= {
+                *table
+            }:  # of a surface, which is no curve but at one point
                 if labels[-1] != HEIGHT:
                     continue
                 distance = table["x_mm"] ** 2 + table["y_mm"] ** 2

@@ -3,11 +3,12 @@
 Doubts are about units, ratios, moduli and swapped yarns. A plan proposes one load ratio at a time.
 """
 
+import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,22 +48,28 @@ class PathObjective(StrainObjective):
     quantities = ("warp strain", "fill strain")
     #: Nuisance parameter of the share of the loads that reaches the field, and its start.
     load_share: tuple[str, float] | None = None
+    #: Relative change of the loads by that share.
+    load_change = 0.0
+
+    def at(self, nuisance: Mapping[str, float]) -> Self:
+        if self.load_share is None or self.load_share[0] not in nuisance:
+            return self
+        name, start = self.load_share
+        objective = copy.copy(self)
+        objective.load_change = nuisance[name] / start - 1.0
+        return objective
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        residual = super().residual(history)
-        if self.load_share is None or not nuisance:
-            return residual
-        name, start = self.load_share
-        return residual + (nuisance[name] / start - 1.0) * self._by_load()
+        return StrainObjective.residual(self.at(nuisance or {}), history)
 
     def nuisance_columns(
         self, names: Sequence[str], nuisance: Mapping[str, float], history: History
     ) -> Array:
         assert self.load_share is not None
-        return self._by_load()[:, None] / self.load_share[1]
+        return self.in_blocks(self._slopes_by_load())[:, None] / self.load_share[1]
 
-    def _by_load(self) -> Array:
-        """Return the derivatives (m,) of the residuals by a relative change of the loads.
+    def _slopes_by_load(self) -> Array:
+        """Return the derivatives (n, 2) of model less data by a relative change of the loads.
 
         The strain at the stated load is then smaller by the slope of the measured curve.
         """
@@ -70,7 +77,7 @@ class PathObjective(StrainObjective):
         powers = np.arange(min(5, len(larger)))
         curves = np.linalg.lstsq(larger[:, None] ** powers, self.strain, rcond=None)[0]
         slopes = (powers * larger[:, None] ** powers) @ curves
-        return self.in_blocks(slopes - slopes[0])
+        return slopes - slopes[0]
 
     @property
     def positions(self) -> tuple[Array, ...]:
@@ -83,7 +90,7 @@ class PathObjective(StrainObjective):
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, 2) since the beginning of the path."""
         strains = elongations(history.displacement)
-        return strains - strains[0]
+        return strains - strains[0] + self.load_change * self._slopes_by_load()
 
     def jacobian(self, history: History, slope: Array) -> Array:
         slopes = elongations(slope)

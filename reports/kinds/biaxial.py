@@ -51,7 +51,7 @@ def misfit_table(paths: Sequence[FittedPart]) -> Table:
             path.ratio,
             *rms,
             f"{path.cycle.number} of {path.cycle_count}",
-            len(path.load),
+            len(path.load) - PathObjective.first_row,
             *path.larger[[0, -1]],
             *(PERCENT * path.residual),
         ]
@@ -147,7 +147,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
         numbers[p.data.ratio] = {
             "rms_warp_percent": warp,
             "rms_fill_percent": fill,
-            "matched": len(p.data.load),
+            "matched": len(p.data.load) - PathObjective.first_row,
             "cycle": p.data.cycle.number,
             "cycles": p.data.cycle_count,
             "end_load_warp_kN_per_m": p.data.load[-1, 0],

@@ -330,7 +330,7 @@ class SimulatedStrips:
         self.within_range = within_range
         self.tables: list[pd.DataFrame] = []
         self.curves: dict[str, list[NamedCurve]] = {direction: [] for direction in test.strips}
-        self.rms: dict[str, list[float]] = {direction: [] for direction in test.strips}
+        self.rms: dict[str, list[float | None]] = {direction: [] for direction in test.strips}
         #: Largest RMS error by card, relative to the direction's largest measured load.
         self.errors: dict[str, float] = {}
 
@@ -359,9 +359,10 @@ class SimulatedStrips:
         total = sum(errors) if len(errors) == len(strips) else None
         directions = {direction: strip.numbers for direction, strip in strips.items()}
         words = ", ".join(f"{direction} {strip.words}" for direction, strip in strips.items())
+        errors_known = any(numbers.get("rms_N") is not None for numbers in directions.values())
         sum_words = "" if total is None else f"; sum {total:.4g} N"
         numbers = {"e_uniaxial_N": total, "directions": directions}
-        return numbers, f"{name}: RMS {words}{sum_words}"
+        return numbers, f"{name}: {'RMS ' if errors_known else ''}{words}{sum_words}"
 
     def _add_strip(
         self, direction: str, name: str, card: MaterialCard, run: CardRun, bias_stem: str
@@ -376,14 +377,14 @@ class SimulatedStrips:
         self.tables.append(pd.DataFrame({**columns, "load_N": history.load}))
         count = _count_within_range(model, card, history) if self.within_range else len(u)
         shown_to = u[count - 1] if count else 0.0
-        if count:
-            self.curves[direction].append((name, u[:count], history.load[:count]))
         error = None
         strip = self.test.strips[direction]
         if strip.polynomial is not None and count:
             error = rms_of_loads(self.test, strip, model, history, shown_to)
-        if error is not None:
+        if count:
+            self.curves[direction].append((name, u[:count], history.load[:count]))
             self.rms[direction].append(error)
+        if error is not None:
             relative = error / loads_to_match(self.test, strip, model)[1].max()
             self.errors[name] = max(relative, self.errors.get(name, 0.0))
         if cut_of(direction) == "bias":
@@ -397,7 +398,7 @@ class SimulatedStrips:
             "shown_to_mm": shown_to,
             "strain_reached": by_strain(strains_of(history)),
         }
-        words = f"{end:.4g} N at the end"
+        words = f"load {end:.4g} N at the end"
         if error is not None:
             words = f"{error:.4g} N to {shown_to:.3g} mm"
         return SimulatedStrip(numbers, words, error if count == len(u) else None)

@@ -508,7 +508,7 @@ def audit(audit, test, section, numbers):
                           rel=1e-7, abs=1e-8, rows=mine)  # fmt: skip
         # Strains in per cent: of an exact fit differences are rounding.
         ledger.json(path, errors, rel=1e-6, abs=1e-13)
-        counts = {"matched": len(load), "cycle": count, "cycles": count}
+        counts = {"matched": len(load) - 1, "cycle": count, "cycles": count}
         ledger.json(path, counts)
         ends = {f"end_load_{y}_kN_per_m": float(load[-1, k]) for k, y in enumerate(YARNS)}
         ends |= {f"residual_{y}_percent": float(kept[k]) for k, y in enumerate(YARNS)}
@@ -516,7 +516,7 @@ def audit(audit, test, section, numbers):
         larger = load.max(axis=1)
         rms = [own[f"rms_{yarn}_percent"] for yarn in YARNS]
         span = [float(larger[0]), float(larger[-1])]
-        cells.append([ratio, *rms, f"{count} of {count}", len(load), *span, *map(float, kept)])
+        cells.append([ratio, *rms, f"{count} of {count}", len(load) - 1, *span, *map(float, kept)])
     header = "ratio|RMS error warp, %|RMS error fill, %|cycle|points matched|from load, kN/m|"
     header = f"{header}to load, kN/m|strain kept before it, warp, %|fill, %".split("|")
     ledger.table("Misfit by ratio", header, cells, slack=1e-6)

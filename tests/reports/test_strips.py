@@ -38,6 +38,11 @@ def test_loads_of_models_are_drawn_beside_points():
     assert (scatter.lower, scatter.upper) == ([-21.7] * 2, [21.7] * 2) and low.level == 0.0
     assert low.title == "warp: RMS error Table 3.2 3.11 N, bubble 68 N"
     assert bias.title == "45° bias: RMS error 50.1 N, scatter 21.7 N"
+    models = [(name, U, 100 * U) for name in ("A", "B", "C")]
+    _, low = load_charts("l", [strip(models=models, rms=[None, 15.0, 585.0])]).charts
+    assert low.title == "warp: RMS error B 15 N, C 585 N"
+    top_of_two, _ = load_charts("l", [strip(models=models[:2], rms=[None, 15.0])]).charts
+    assert top_of_two.title == "warp"
     assert shown(top) == ("gauge elongation, mm", "load, N", "warp")
     assert shown(low)[:2] == ("gauge elongation, mm", "difference, N")
     names = ["load polynomial", "measured", "Table 3.2", "bubble", "scatter of specimens (±)"]

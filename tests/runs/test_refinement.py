@@ -130,6 +130,10 @@ def test_order_and_limit_of_known_error_are_found(bars):
     assert steps[-1].done == steps[-1].increments == 4 and bars.progress is None
     assert (study.result["solver"], study.result["card"]) == ("bars", "soft")
     assert study.warnings == ()
+    # Without a finer level nothing tells the error of the project.
+    study = refine(project_of(BarTest("a bar")), CARD, levels=2)
+    quantity = study.result["models"]["a bar"]["quantities"][END]
+    assert quantity["own_error"] is None and study.errors == {}
     study = refine(project_of(BarTest("a bar")), CARD, what="increments", levels=3)
     levels = [(r.part.increments, r.size) for r in study.runs["a bar"]]
     assert levels == [(4, 1 / 4), (8, 1 / 8), (16, 1 / 16)]

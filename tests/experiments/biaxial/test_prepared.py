@@ -26,6 +26,28 @@ from ...builders.projects import fit_setup
 CONSTANT_LAW = HypoelasticLaw.linear(900.0, 600.0, 30.0)
 
 
+def test_errors_at_a_fitted_share_of_the_load_are_those_of_the_residuals(tmp_path):
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["2:1"]))
+    test = "load_share = 0.9\nload_share_deviation = 0.05"
+    setup = fit_setup(biaxial_project(tmp_path, test, "constant"))
+    (comparison,) = setup.tests[0].comparisons(setup.make_solver, Weighting())
+    history = comparison.run(CONSTANT_LAW, tuple(range(12)), {}, False)
+    objective = comparison.objective
+    name, start = objective.load_share
+    errors = []
+    for share in (0.9, 0.8):
+        fitted = objective.at({name: share})
+        residual = objective.residual(history, {name: share}) * objective.scale
+        np.testing.assert_allclose(
+            fitted.rms(history), np.sqrt(np.mean(residual.reshape(2, -1) ** 2, axis=1))
+        )
+        difference = 100 * (fitted.modelled(history) - objective.strain)[1:]
+        np.testing.assert_allclose(difference.T.ravel(), residual)
+        errors.append(residual)
+    column = objective.nuisance_columns([name], {name: start}, history)[:, 0] * objective.scale
+    np.testing.assert_allclose(errors[1] - errors[0], -0.1 * column, rtol=1e-9)
+
+
 def test_biaxial_residuals_and_derivatives(five_ratios_folder):
     setup = fit_setup(five_ratios_folder / "project.toml")
     (prepared,) = setup.tests

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.prepared_readings import PreparedReadings
@@ -59,6 +60,12 @@ def test_masks_leave_out_readings(heights):
 def test_three_gauges_tell_warp_from_fill(heights):
     noise = 0.05 * np.random.default_rng(4).standard_normal(heights.shape)
     fit = bf.fit(gauged(heights + noise, elements=48), law=CONSTANT, fabric=FABRIC, starts=1)
+    residuals = fit.residuals()
+    curves = fit.curves()
+    assert [label.split(" at ")[0] for label in curves] == ["bubble height"] * 3
+    for curve in curves.values():
+        assert len(curve) == len(PRESSURES) and curve["pressure_kPa"].is_monotonic_increasing
+    assert pd.concat(curves)["measured"].tolist() == residuals["measured"].tolist()
     sure = fit.best.certainty
     for name, modulus in (("E1", 700.0), ("E2", 300.0)):
         band = sure.moduli[name]
