@@ -183,7 +183,9 @@ POLYNOMIAL_PLACES = 200
 MODULUS_PLACES = 121
 
 
-def load_panel(strip: Strip, models: Sequence[NamedCurve], rms: Sequence[float]) -> StripCurves:
+def load_panel(
+    strip: Strip, models: Sequence[NamedCurve], rms: Sequence[float | None]
+) -> StripCurves:
     """Return the curves of one direction for `load_charts`.
 
     Parameters
