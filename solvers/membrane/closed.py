@@ -151,9 +151,11 @@ class ClosedMembrane(Membrane):
     """
 
     #: Largest number of corrections of a step for contact that it makes or ends.
-    max_contact_corrections: ClassVar[int] = 4
+    max_contact_corrections: ClassVar[int] = 6
     #: Residual of a step that needs no such correction, as a share of that before the step.
     contact_tolerance: ClassVar[float] = 0.05
+    #: Share of the residual after the step as it was up to which a corrected step is taken.
+    contact_gain: ClassVar[float] = 0.3
 
     #: Factor by which the artificial stress of the slack state is reduced in every iteration.
     slack_fade: ClassVar[float] = 0.6
@@ -288,53 +290,81 @@ class ClosedMembrane(Membrane):
             touched.append((stiffness, nodes))
         return forces, touched
 
-    def step_into_contact(self, u: Array, step: Array) -> Array | None:
-        """Return a Newton step, corrected for contact that it makes or ends, if it does.
+    def step_into_contact(self, u: Array, step: Array) -> Array:
+        """Return a Newton step, corrected for contact that it makes or ends.
 
-        The residual is linearised but for the contact forces, which are those after the step.
+        The residual is linearised but for the contact forces, which are those after the step;
+        corrections are Newton's steps with that residual. The tangent gets the contact after the
+        step that is returned.
 
         Parameters
         ----------
         u : (n, 3) array, mm
-            Displacement at the last evaluation, whose tangent is overwritten.
+            Displacement at the last evaluation.
         step : (free,) array, mm
 
         Returns
         -------
-        (free,) array, mm, or None
-            None if the step needs no correction, or none is found.
+        (free,) array, mm
+            The step as it was where it needs no correction, or none is found.
         """
-        free = self.free
-        before = self.residual[free]
+        before = self.residual[self.free]
         limit = self.contact_tolerance * float(np.linalg.norm(before))
-        without_contact = before + np.sum(self.contact, axis=0).reshape(-1)[free]
-        corrections = 0
-        while True:
-            motion = np.zeros_like(u)
-            motion.reshape(-1)[free] = step
-            forces, touched = self._contact_at(u + motion)
-            after = self.tangent.times(step[:, None])[:, 0] + without_contact
-            after -= (np.sum(forces, axis=0) + self._contact_product(motion)).reshape(-1)[free]
-            if float(np.linalg.norm(after)) <= limit:
-                return step if corrections else None
-            if corrections == self.max_contact_corrections:
-                return None
-            for sign, contact in ((-1.0, self.touched), (1.0, touched)):
-                for stiffness, nodes in contact:
-                    self.add(self.node_slot[nodes], sign * stiffness)
-            self.touched = touched
+        linear = before + np.sum(self.contact, axis=0).reshape(-1)[self.free]
+        linear += self._times_without_contact(step)
+        first_touched = self.touched
+        after, touched = self._after_contact(u, step, linear)
+        first_error = error = float(np.linalg.norm(after))
+        corrected = step
+        for _ in range(self.max_contact_corrections):
+            if error <= limit:
+                break
+            self._change_contact(touched)
             correction = by_near_inverse(self.tangent, after, tolerance=0.05)
-            if correction is None:
-                return None
-            step = step - correction
-            corrections += 1
+            # Where the forces do work along it, it leads to an unstable equilibrium.
+            if correction is None or float(correction @ after) < 0:
+                break
+            corrected = corrected - correction
+            linear -= self._times_without_contact(correction)
+            after, touched = self._after_contact(u, corrected, linear)
+            error = float(np.linalg.norm(after))
+        if error <= limit or error < self.contact_gain * first_error:
+            return corrected
+        self._change_contact(first_touched)
+        return step
 
-    def _contact_product(self, motion: Array) -> Array:
-        """Return the stiffness of `touched` times a motion (n, 3) mm of the nodes, (n, 3) N."""
+    def _after_contact(
+        self, u: Array, step: Array, linear: Array
+    ) -> tuple[Array, list[tuple[Array, NDArray[np.intp]]]]:
+        """Return the residual (free,) N of a linearised problem after a step, and `touched` there.
+
+        Parameters
+        ----------
+        u : (n, 3) array, mm
+            Displacement before it.
+        step, linear : (free,) array, mm and N
+            The residual without contact, linearised, is `linear` after the step.
+        """
+        moved = u.copy()
+        moved.reshape(-1)[self.free] += step
+        forces, touched = self._contact_at(moved)
+        return linear - np.sum(forces, axis=0).reshape(-1)[self.free], touched
+
+    def _change_contact(self, touched: list[tuple[Array, NDArray[np.intp]]]) -> None:
+        """Replace the stiffness of contact in the tangent."""
+        for sign, contact in ((-1.0, self.touched), (1.0, touched)):
+            for stiffness, nodes in contact:
+                self.add(self.node_slot[nodes], sign * stiffness)
+        self.touched = touched
+
+    def _times_without_contact(self, step: Array) -> Array:
+        """Return the tangent without contact times a step (free,) mm, in N."""
+        motion = np.zeros(self.reference.shape)
+        motion.reshape(-1)[self.free] = step
         product = np.zeros_like(motion)
         for stiffness, nodes in self.touched:
             product[nodes] += np.einsum("tij,tj->ti", stiffness, motion[nodes])
-        return product
+        return self.tangent.times(step[:, None])[:, 0] - product.reshape(-1)[self.free]
 
     def node_weight(self, weight: float) -> Array:
         """Return the weight (n,) N that each node carries.

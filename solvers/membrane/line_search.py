@@ -24,7 +24,11 @@ class LineSearchSettings:
     """Settings of the iteration with a line search; residuals are ratios to the largest load."""
 
     max_steps: int = 16  #: number of steps after which the iteration fails
-    max_trials: int = 10  #: number of evaluations of the residual in one step
+    max_trials: int = 5  #: number of evaluations of the residual in one step
+    #: The iteration ends where more steps do not halve the residual: below `rounding_below` that is
+    #: taken for rounding, otherwise the iteration fails, as near an unstable state.
+    max_fruitless: int = 4
+    rounding_below: float = 1e-6
     #: A length of the step is accepted where the work of the residual along the step is at most
     #: this share of the work at its start,
     work_left: float = 0.5
@@ -49,9 +53,6 @@ class LineSearchSettings:
     smallest_share: float = 0.1
     blind_share: float = 0.3
     largest_share: float = 0.9
-    #: Below `rounding_below`, a residual that `max_idle` steps do not reduce is taken for rounding.
-    rounding_below: float = 1e-6
-    max_idle: int = 3
 
 
 SETTINGS = LineSearchSettings()
@@ -60,7 +61,7 @@ SETTINGS = LineSearchSettings()
 class ContactEquations(Equations, Protocol):
     """Equations of equilibrium with contact."""
 
-    def step_into_contact(self, u: Array, step: Array) -> Array | None:
+    def step_into_contact(self, u: Array, step: Array) -> Array:
         """See `ClosedMembrane.step_into_contact`."""
 
 
@@ -88,15 +89,17 @@ def searched_equilibrium(
     u = u.copy()
     tolerance = settings.tolerance_factor * equations.tolerance
     norm = equations.unbalance(u, pressure, with_tangent=True)
-    smallest_norm = np.inf
-    idle = 0
+    halved_norm = np.inf
+    fruitless = 0
     for _ in range(settings.max_steps):
         if norm < tolerance:
             return u
-        idle = idle + 1 if 0.5 * smallest_norm < norm < settings.rounding_below else 0
-        if idle >= settings.max_idle:
-            return u
-        smallest_norm = min(smallest_norm, norm)
+        fruitless += 1
+        if norm <= 0.5 * halved_norm:
+            halved_norm = norm
+            fruitless = 0
+        if fruitless > settings.max_fruitless:
+            return u if norm < settings.rounding_below else None
         is_changed = norm > settings.reused_below
         step = None
         if np.isfinite(norm):
@@ -105,11 +108,9 @@ def searched_equilibrium(
             step = _newton_step(equations, is_changed, solved_to)
         if step is None:
             return None
-        search = LineSearch(equations, pressure, settings)
-        changed_norm = math.inf
         if norm > settings.contact_above:
-            changed_norm = search.change_contact(u, step, norm)
-        norm = changed_norm if changed_norm < norm else search.advance(u, step, norm)
+            step = equations.step_into_contact(u, step)
+        norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
     return u if norm < tolerance else None
 
 
@@ -149,34 +150,6 @@ class LineSearch:
     high: float = math.inf
     slope_low: float = math.nan
     slope_high: float = math.nan
-
-    def change_contact(self, u: Array, step: Array, norm: float) -> float:
-        """Move u (n, 3) by a step (free,) corrected for contact, if that reduces the residual.
-
-        Parameters
-        ----------
-        norm : float
-            Relative residual at the start.
-
-        Returns
-        -------
-        float
-            Relative residual at the end, or inf where u stays.
-        """
-        equations = self.equations
-        corrected = equations.step_into_contact(u, step)
-        if corrected is None or np.abs(corrected).max() > equations.step_limit:
-            return math.inf
-        unknowns = u.reshape(-1)
-        start = unknowns[equations.free].copy()
-        residual = equations.residual.copy()
-        unknowns[equations.free] = start + corrected
-        trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
-        if trial_norm < norm:
-            return trial_norm
-        unknowns[equations.free] = start
-        equations.residual[:] = residual
-        return math.inf
 
     def advance(self, u: Array, step: Array, norm: float) -> float:
         """Move u (n, 3) along a step (free,) by an accepted share of it.

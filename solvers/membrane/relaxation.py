@@ -24,9 +24,10 @@ class ViscousRelaxation:
     smallest: float = 1e-3  #: smallest viscosity
     largest: float = 1e5  #: largest viscosity: the search fails beyond it
     #: A static equilibrium is tried at or below this viscosity, after a step in which no node
-    #: moved by more than this share of a quad's size.
+    #: moved by more than this share of a quad's size; after a failure, by so much less.
     static_below: float = 10.0
     static_motion: float = 0.05
+    static_decrease: float = 0.3
 
 
 SETTINGS = ViscousRelaxation()
@@ -45,6 +46,7 @@ def settled(
     unit = membrane.pressure / facet
     viscosity = settings.initial * unit
     u = start
+    static_motion = settings.static_motion * facet
     try:
         for _ in range(settings.max_steps):
             membrane.drag(viscosity, u)
@@ -56,7 +58,7 @@ def settled(
                 continue
             motion = float(np.abs(viscous - u).max())
             u = viscous
-            is_fast = motion > settings.static_motion * facet
+            is_fast = motion > static_motion
             is_viscous = viscosity > settings.static_below * unit
             viscosity = max(settings.decrease * viscosity, settings.smallest * unit)
             if is_viscous or is_fast:
@@ -65,6 +67,7 @@ def settled(
             equilibrium = membrane.equilibrium(u, membrane.pressure)
             if equilibrium is not None:
                 return equilibrium
+            static_motion = settings.static_decrease * motion
         return None
     finally:
         membrane.drag(0.0, start)
