@@ -223,35 +223,12 @@ def tangent_for(
     columns = place[np.tile(dofs, (1, 12))]
     is_free = (rows >= 0) & (columns >= 0)
     largest_band = LARGEST_BAND * (TUBE_FACTOR if is_tube else 1)
-    # Whatever the order, the twelve unknowns of a quad make a band of eleven diagonals or more.
-    if (3 * 11 + 1) * len(free) <= largest_band:
-        rank, width = _narrowest(quads, points, place, rows[is_free], columns[is_free], is_tube)
-        if (3 * width + 1) * len(free) <= largest_band:
-            return BandedTangent(rows, columns, is_free, rank)
-    return SparseTangent(rows, columns, is_free, Dissection(quads, points), place)
-
-
-def _narrowest(
-    quads: NDArray[np.intp],
-    points: Array,
-    place: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    is_tube: bool,
-) -> tuple[NDArray[np.intp], int]:
-    """Return new numbers (free,) of the unknowns with the narrowest band found, and its width.
-
-    Parameters
-    ----------
-    quads, points, is_tube
-        See `tangent_for`.
-    place : (unknowns,) array
-        Number of each free unknown, or -1.
-    rows, columns : (entries,) array
-        Free unknowns of each entry.
-    """
-    size = int(place.max()) + 1
-    pattern = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(size, size))
+    # In any order, the twelve unknowns of a quad make a band of eleven diagonals or more.
+    if (3 * 11 + 1) * len(free) > largest_band:
+        return SparseTangent(rows, columns, is_free, Dissection(quads, points), place)
+    pattern = scipy.sparse.csr_matrix(
+        (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
+    )
     orders = [scipy.sparse.csgraph.reverse_cuthill_mckee(pattern, symmetric_mode=True)]
     orders.append(np.arange(len(free)))  # that of a strip goes row by row, in half the width
     for nodes in swept(quads, points) if is_tube else []:
@@ -260,8 +237,10 @@ def _narrowest(
     ranks = [np.argsort(order) for order in orders]
     i, j = pattern.nonzero()
     widths = [int(np.abs(rank[i] - rank[j]).max()) for rank in ranks]
-    narrowest = int(np.argmin(widths))
-    return ranks[narrowest], widths[narrowest]
+    width = min(widths)
+    if (3 * width + 1) * len(free) <= largest_band:
+        return BandedTangent(rows, columns, is_free, ranks[int(np.argmin(widths))])
+    return SparseTangent(rows, columns, is_free, Dissection(quads, points), place)
 
 
 class StoredTangent(Tangent):

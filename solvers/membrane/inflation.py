@@ -236,8 +236,8 @@ class Filling(Loading):
     leaps : bool
         Whether a limit pressure is passed in one increment instead of by volume control, as is
         enough where only the end counts and nothing is differentiated.
-    snaps : list of (float, float, str)
-        For each snap, the pressures (MPa) before and after it, and how it was passed.
+    snaps : list of (float, float, bool)
+        For each snap, the pressures (MPa) before and after it, and whether it was passed at once.
     """
 
     max_halvings = 8
@@ -252,7 +252,7 @@ class Filling(Loading):
         self.membrane = membrane
         self.neighbours = neighbours
         self.leaps = leaps
-        self.snaps: list[tuple[float, float, str]] = []
+        self.snaps: list[tuple[float, float, bool]] = []
 
     def remarks(self) -> tuple[Note, ...]:
         """Return a note for each snap."""
@@ -260,9 +260,9 @@ class Filling(Loading):
             Note(
                 SNAP,
                 f"snaps, or nearly, between {previous * 1e3:.4g} and {level * 1e3:.4g} kPa: "
-                f"passed {manner}",
+                f"passed {'in one increment' if leaps else 'by leading the volume'}",
             )
-            for previous, level, manner in self.snaps
+            for previous, level, leaps in self.snaps
         )
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
@@ -297,8 +297,7 @@ class Filling(Loading):
             if self.leaps and displacement is not None:
                 # Loads of bent cylinders differ by 3e-5 from those after leading the volume.
                 leap = self.equilibrium(displacement, level)
-            manner = "by leading the volume" if leap is None else "in one increment"
-            self.snaps.append((lower, level, manner))
+            self.snaps.append((lower, level, leap is not None))
             if leap is not None:
                 return leap
             return through_snap(self.membrane, self.neighbours, u, lower, level)

@@ -8,12 +8,16 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import ClosedGas
 from bubblefit.runs.verification.thin_walls import ISOTROPIC, RADIUS
 from bubblefit.runs.verification.thin_walls import tube_model as tube
+from bubblefit.solvers.membrane import closed
+from bubblefit.solvers.membrane.bending import RigidBodies
 from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity
 from bubblefit.solvers.membrane.relaxation import settled
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import STIFF
 
 from ...builders.laws import TABLE_4_2
 from ...support.refusals import complaint
+from .cases import square_beam
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 
@@ -78,3 +82,33 @@ def test_cavity_volume_of_a_box_and_of_a_slice():
     assert "the cavity is open between nodes" in complaint(
         inflate, replace(model, supports=supports)
     )
+
+
+def test_step_into_contact_leaves_less_residual_or_the_tangent_as_it_was(monkeypatch):
+    model = square_beam((2.0,))
+    law = HypoelasticLaw.linear(5000.0, 4000.0, 200.0)
+    u = MembraneSolver(1e-9).run(model, law).displacement[0]
+    m = closed.closed_membrane(model, law, 1e-9, model.fixed(bent=True), STIFF)
+    bodies = RigidBodies(m, model.bending, u)
+    bodies.begin_bending(model.bending, u, model.pressures[-1])
+    bodies.move(0.0)
+    m.gas, pressure = None, 1.1 * model.pressures[-1]
+
+    def newton_step():
+        before = m.unbalance(u, pressure, with_tangent=True)
+        m.tangent.factor()
+        return before, -m.tangent.solve(m.residual[m.free])
+
+    def left_after(step):
+        end = u.copy()
+        end.reshape(-1)[m.free] += step
+        return m.unbalance(end, pressure, with_tangent=False)
+
+    before, step = newton_step()
+    corrected = m.step_into_contact(u, step)
+    assert left_after(corrected) < 0.3 * before < 0.3 * left_after(step)
+    _, step = newton_step()
+    tangent = m.tangent.data.copy()
+    monkeypatch.setattr(closed, "by_near_inverse", lambda *_, **__: None)
+    assert m.step_into_contact(u, step) is step
+    assert m.tangent.data == pytest.approx(tangent, abs=1e-9 * np.abs(tangent).max())
