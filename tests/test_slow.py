@@ -22,7 +22,8 @@ def test_listed_tests_and_fixtures_exist():
     for name in listed():
         path, _, function = name.partition("::")
         file = ROOT / path
-        texts = [file] if file.is_file() else [*file.rglob("conftest.py")]
+        shared = [*file.rglob("conftest.py"), *file.glob("fixtures.py")]
+        texts = [file] if file.is_file() else shared
         function = function.split("::")[-1]
         if not any(f"def {function}(" in text.read_text(encoding="utf-8") for text in texts):
             missing.append(name)

@@ -231,6 +231,12 @@ class Form(FormFit):
     coefficients, fitted, rms = 0, 3.0, {"warp": 2.0, "fill": 4.0}
 
 
+def test_project_of_a_comparison_is_that_of_its_first_form():
+    fits = [SimpleNamespace(project=name) for name in ("first", "second")]
+    forms = tuple(SimpleNamespace(fit=fit) for fit in fits)
+    assert study.LawComparison(forms, fold_starts=1).project == "first"
+
+
 def form(name, coefficients, *folds):
     objective = SimpleNamespace(unit="N")
     parts = [SimpleNamespace(name=part, objective=objective) for part in ("warp", "fill", "b")]

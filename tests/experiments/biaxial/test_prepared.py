@@ -84,6 +84,32 @@ def test_biaxial_residuals_and_derivatives(five_ratios_folder):
     np.testing.assert_allclose(shifted.residual(other, {}), residual, atol=1e-12)
 
 
+@pytest.mark.parametrize(("deviation", "lower", "upper"), [(0.05, 0.6, 1.0), (0.25, 0.08, 1.52)])
+def test_share_of_loads_is_bounded_by_four_deviations_and_above_zero(
+    tmp_path, deviation, lower, upper
+):
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1"]))
+    keys = f"load_share = 0.8\nload_share_deviation = {deviation}"
+    setup = fit_setup(biaxial_project(tmp_path, keys))
+    (comparison,) = setup.tests[0].comparisons(setup.make_solver, Weighting())
+    (share,) = comparison.nuisance
+    assert (share.lower, share.start, share.upper) == pytest.approx((lower, 0.8, upper))
+    history = comparison.run(BENT_LAW, (), {}, warm=False)
+    plain = comparison.objective.residual(history)
+    np.testing.assert_array_equal(comparison.objective.residual(history, {share.name: 0.8}), plain)
+    assert np.abs(comparison.objective.residual(history, {share.name: 0.7}) - plain).max() > 0
+
+
+def test_share_of_loads_that_is_known_adds_no_residual(tmp_path):
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1"]))
+    setup = fit_setup(biaxial_project(tmp_path, "load_share = 0.8"))
+    (comparison,) = setup.tests[0].comparisons(setup.make_solver, Weighting())
+    assert comparison.nuisance == ()
+    history = comparison.run(BENT_LAW, (), {}, warm=False)
+    plain, beside = (comparison.objective.residual(history, n) for n in (None, {"compliance": 1.0}))
+    np.testing.assert_array_equal(beside, plain)
+
+
 @pytest.mark.parametrize(
     ("line", "noise", "how"), [("noise = 0.03", 0.03, "given"), ("", 0.01, "assumed")]
 )

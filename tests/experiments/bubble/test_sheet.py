@@ -277,6 +277,16 @@ def test_priors_of_a_sheet_weigh_as_twenty_points():
     assert [n.model_parameter for n in found] == [n.name for n in found]
 
 
+def test_unknown_tensions_are_bounded_by_six_deviations_and_by_zero():
+    model: Any = SimpleNamespace(modes={}, strains={})
+    settings = SheetSettings(tension=(0.3, 2.0), tension_prior=0.1)
+    warp, fill = sheet_nuisance(settings, model, np.ones(3))
+    assert (warp.name, fill.name) == ("tension_warp", "tension_fill")
+    assert (warp.lower, warp.start, warp.upper) == pytest.approx((0.0, 0.3, 0.9))
+    assert (fill.lower, fill.start, fill.upper) == pytest.approx((1.4, 2.0, 2.6))
+    assert warp.prior == fill.prior == 0.1 and warp.unit == "N/mm"
+
+
 @pytest.mark.parametrize(
     ("degree", "moving_rim", "count", "expected"),
     [(None, False, 5000, 8), (None, True, 5000, 10), (None, True, 250, 9), (None, True, 113, 8),

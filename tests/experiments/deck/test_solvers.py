@@ -103,6 +103,15 @@ def test_step_goes_down_at_the_upper_bound(model):
     assert history.load_slope[-1, 0] == pytest.approx(2 * (1.6 - 1.6**-2), rel=1e-2)
 
 
+def test_step_goes_up_below_the_upper_bound(model, monkeypatch):
+    decks = []
+    run = RoundedBar.run
+    monkeypatch.setattr(RoundedBar, "run", lambda *a: decks.append(a[1]) or run(*a))
+    DeckSolver(RoundedBar()).run_with_sensitivity(model, ANY_LAW, ["C10"])
+    plain, shifted = (float(deck.files["job.txt"].split()[0]) for deck in decks)
+    assert shifted > plain == pytest.approx(model.values["C10"])
+
+
 def test_failure_of_a_column_is_that_of_the_run(model):
     below = model.with_parameters({"C10": -model.values["C10"] - 1.0, "C01": 1.5})
     raised(SolverFailure, "no such rubber", DeckSolver(RoundedBar()).run, below, ANY_LAW)
