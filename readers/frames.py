@@ -43,12 +43,15 @@ class FrameSource:
         Column and unit by quantity, as the file has them.
     notes : tuple of str
         Choices made while reading.
+    is_turned_over : bool
+        Whether y and z, which the file has pointing down and away from the camera, are reversed.
     """
 
     format: str = ""
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    is_turned_over: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +336,8 @@ def frame_of(
         raise InputError(path, "", _describe_missing(missing, rows))
     unknown = np.full(good.sum(), np.nan)
     table = np.column_stack([values.get(quantity, unknown) for quantity in QUANTITIES])
-    if rows.camera_axes if options.camera_axes is None else options.camera_axes:
+    is_turned_over = rows.camera_axes if options.camera_axes is None else options.camera_axes
+    if is_turned_over:
         table[:, [1, 2, 4, 5]] *= -1.0
         note = "y and z are turned over: in the file y points down, z away from the camera"
         notes = (*notes, note)
@@ -344,7 +348,7 @@ def frame_of(
         path=path,
         dropped=dropped,
         sigma=None if rows.sigma is None else rows.sigma[good],
-        source=FrameSource(format, dict(rows.names), units, notes),
+        source=FrameSource(format, dict(rows.names), units, notes, is_turned_over),
         ids=None if rows.ids is None else rows.ids[good],
         number=rows.number,
         rows=_row_numbers(rows, good),

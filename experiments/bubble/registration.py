@@ -96,14 +96,14 @@ class RegistrationOptions:
         the sheet, "camera" takes the camera's own x-y plane; "found" takes the clamp where it was
         measured, else the edge.
     centre : (3,) tuple, mm, or None
-        Centre of the rim in the camera's coordinates.
+        Centre of the rim in the camera's coordinates, for `register_fields` in those of the files.
     rim_angle : float, degrees, or None
         Angle of the first semi-axis of an elliptic rim, from the warp towards the fill.
     warp : float, degrees, or None
         Angle of the warp from the camera's x axis, positive towards its y axis where the sheet
         rises towards the camera's z, away from it otherwise.
     warp_points : two (3,) tuples, mm, or None
-        Two marks on a line along the warp, in the camera's coordinates.
+        Two marks on a line along the warp, in the coordinates of the centre.
     warp_is_stiff : bool
         Whether, of the two axes of symmetry that are found, the one that is strained less is the
         warp (otherwise it is the fill).
@@ -128,6 +128,19 @@ class RegistrationOptions:
         if self.warp is not None and self.warp_points is not None:
             problem = "expected an angle 'warp' or two points 'warp_points', not both"
             raise InputError(None, "warp_points", problem)
+
+    def turned_over(self) -> RegistrationOptions:
+        """Return the options for fields whose y and z, unlike those of the marks, are reversed."""
+
+        def reversed_point(point: Point) -> Point:
+            x, y, z = point
+            return x, -y, -z
+
+        centre = None if self.centre is None else reversed_point(self.centre)
+        if self.warp_points is None:
+            return replace(self, centre=centre)
+        first, second = map(reversed_point, self.warp_points)
+        return replace(self, centre=centre, warp_points=(first, second))
 
 
 ALL_FOUND = RegistrationOptions()
@@ -436,6 +449,8 @@ def register_fields(
         `register` raises it, or a plane through the clamp or the edge is asked for and the fields
         have no heights.
     """
+    if fields[0].source.is_turned_over:
+        options = options.turned_over()
     has_heights = all(field.z is not None for field in fields)
     if not has_heights:
         if options.plane not in ("found", "camera"):

@@ -23,7 +23,8 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
 from bubblefit.meshes.sampling import Facet, SmoothReading
-from bubblefit.readers.frames import Frame
+from bubblefit.readers.fields import read_fields
+from bubblefit.readers.frames import Frame, FrameOptions
 from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
 from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -144,6 +145,27 @@ def test_given_plane_centre_and_axes_are_taken():
     assert "warp_points: expected two different points" in complaint(
         register, BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS), one
     )
+
+
+def test_marks_are_in_the_axes_of_the_files_where_these_are_turned_over(tmp_path):
+    turn, shift = rotation_by("zx", [30.0, 4.0]), np.array([7.0, 11.0, 500.0])
+    frames = [seen_by_camera(frame, turn, shift) for frame in FRAMES_BEYOND_CLAMP]
+    marks = np.vstack([shift, shift + 50.0 * turn[:, 0]])
+    registrations = []
+    for flip in ([1, 1, 1], [1, -1, -1]):
+        files = [tmp_path / f"{frame}_{flip[1]}.csv" for frame in range(len(frames))]
+        for file, frame in zip(files, frames, strict=True):
+            table = np.hstack([frame.points * flip, frame.displacement * flip])
+            np.savetxt(file, table, "%.9f", ",", header="x,y,z,dx,dy,dz", comments="")
+        options = FrameOptions(camera_axes=flip[1] < 0)
+        fields = read_fields(files, (0.02, 0.1, 0.2), options)
+        centre, end = map(tuple, marks * flip)
+        known = {"centre": centre}, {"warp_points": (centre, end)}, {"warp": 30.0}
+        for options in (RegistrationOptions(**keys) for keys in known):
+            registrations.append(register_fields(fields, CIRCLE, options)[1])
+    for found in registrations:
+        assert found.warp_angle == pytest.approx(30.0, abs=0.2)
+        np.testing.assert_allclose(found.placement.origin, shift, atol=0.1)
 
 
 def test_registration_errors_reflect_noise():
