@@ -171,3 +171,17 @@ def test_law_with_memory_is_recovered_from_all_frames(inflations_folder):
     assert (
         replace(model, pressures=test.pressures).up_to_frame(5).increments[-1] == test.pressures[5]
     )
+
+
+@pytest.mark.parametrize(("count", "surface_count"), [(24, 0), (25, 2)])
+def test_points_too_few_for_a_surface_are_matched_without(count, surface_count):
+    """A polynomial of degree 4 in both directions takes 25 points."""
+    random = np.random.default_rng(1)
+    points = np.column_stack([random.uniform(-60.0, 60.0, (count, 2)), np.zeros(count)])
+    rise = np.zeros((count, 3))
+    rise[:, 2] = 20.0 - 2e-3 * (points[:, :2] ** 2).sum(axis=1)
+    bubble = bf.Bubble(points, [rise, 1.2 * rise], [0.05, 0.1], radius=100.0, elements=48)
+    law = bf.Law("constant", strain_range=[0.1, 0.1, 0.1])
+    project = bf.Project.of(bubble, law, fabric=bf.Fabric("made", 0.8))
+    (prepared,) = fit_setup(project).tests
+    assert prepared.test.match_degree == 4 and len(prepared.surfaces) == surface_count

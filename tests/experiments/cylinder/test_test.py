@@ -230,3 +230,15 @@ def test_example_without_optional_keys_has_the_defaults(tmp_path):
     ):
         said, left = ({k: v for k, v in vars(t).items() if k not in own} for t in pair)
         assert said == left
+
+
+def test_beam_without_optional_keys_is_weightless_on_rollers_at_its_axis(tmp_path):
+    keys = ("load_spacing", "roller_below_axis", "mass_per_length")
+    path = tmp_path / "beam.toml"
+    lines = [line for line in BEAM.splitlines() if not line.startswith(keys)]
+    path.write_text("\n".join(lines))
+    (test,) = cylinders_of_project(path)
+    beam = test.model()
+    assert (beam.load_spacing, beam.roller_below, beam.weight) == (0.0, 0.0, 0.0)
+    assert (beam.load_width, beam.friction) == (0.0, 0.0)
+    assert "weightless tube" in test.assumed
