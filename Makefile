@@ -18,12 +18,13 @@ demo: $(READY)
 	$(BIN)/bubblefit bubble examples/bubble-known-solution/project.toml --out out/demo --overwrite
 
 # Without a ccx, its test decks, gfortran or a browser the tests that need one are left out, except in CI.
+# Three processes keep two cores busy, as tests wait for programs, time limits and downloads.
 test: $(READY)
 	@[ -n "$$BUBBLEFIT_CCX" ] || sh .ci/calculix || [ -z "$$CI" ]
 	@sh .ci/decks || [ -z "$$CI" ]
 	@sh .ci/gfortran || [ -z "$$CI" ]
 	@sh .ci/chromium || [ -z "$$CI" ]
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal
 
 # What a developer runs on every change: two minutes on two cores, without slow tests (tests/slow.py).
 test-quick: $(READY)

@@ -2,7 +2,7 @@
 
 `make test-quick` leaves out what tests/slow.txt names: test functions, and fixtures whose tests
 wait for them. Those of the log take their place. Write the log on a quiet machine:
-`pytest -n 2 --dist worksteal --durations=0 > LOG`.
+`pytest -n 3 --dist worksteal --durations=0 > LOG`.
 """
 
 import re
