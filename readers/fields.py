@@ -74,6 +74,7 @@ def read_fields(
     options: FrameOptions = PLAIN,
     format: str | None = None,
     frames: Sequence[int] | None = None,
+    count: int | None = None,
 ) -> tuple[DisplacementField, ...]:
     """Read one displacement field for each pressure.
 
@@ -88,8 +89,10 @@ def read_fields(
     format : str, optional
         Name of the format; recognised by the content if omitted.
     frames : sequence of int, optional
-        Indices, from 0, of the frames that are used, counted through all files; if omitted all,
-        except a first frame at rest in a single file that has one frame more than pressures.
+        Indices, from 0, of the frames that are used, counted through all files; all if omitted.
+    count : int, optional
+        Number of frames that `frames` count; one a pressure if omitted. A first frame at rest in a
+        single file that has one frame more is not counted.
 
     Raises
     ------
@@ -99,11 +102,13 @@ def read_fields(
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
-    used_frames = read_frames(files, options, format)
+    used_frames: Sequence[Frame] = read_frames(files, options, format)
+    if len(files) == 1:
+        used_frames = without_frame_at_rest(used_frames, count or len(pressures))
     if frames is not None:
-        used_frames = tuple(used_frames[number] for number in frames)
-    elif len(files) == 1 and len(used_frames) == len(pressures) + 1 and _is_at_rest(used_frames[0]):
-        used_frames = used_frames[1:]
+        if count is not None:
+            check_count(used_frames, count)
+        used_frames = [used_frames[number] for number in frames]
     return fields_of_frames(used_frames, pressures)
 
 
@@ -123,10 +128,20 @@ def fields_of_frames(
     InputError
         There are not as many frames as pressures, or one has no point.
     """
-    if len(frames) != len(pressures):
-        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(frames)}"
-        raise InputError(None, "files", problem)
+    check_count(frames, len(pressures))
     return tuple(_field_of(f, float(p)) for f, p in zip(frames, pressures, strict=True))
+
+
+def without_frame_at_rest(frames: Sequence[Frame], count: int) -> Sequence[Frame]:
+    """Return the frames of a file without a first one at rest if it is one more than `count`."""
+    return frames[1:] if len(frames) == count + 1 and _is_at_rest(frames[0]) else frames
+
+
+def check_count(frames: Sequence[Frame], count: int) -> None:
+    """Raise InputError unless there is a frame for each of as many pressures."""
+    if len(frames) != count:
+        problem = f"expected one frame for each of {count} pressures, found {len(frames)}"
+        raise InputError(None, "files", problem)
 
 
 def _is_at_rest(frame: Frame) -> bool:

@@ -52,9 +52,13 @@ class PointFiles:
 
     def read_fields(self, pressures: Sequence[float]) -> tuple[DisplacementField, ...]:
         """Return the measured fields at the pressures (MPa); raise InputError for faulty files."""
-        numbers = None if self.recorded is None else self.recorded.frames
+        numbers = None
+        count = None
+        if self.recorded is not None and self.recorded.frames is not None:
+            numbers = self.recorded.frames
+            count = self.recorded.count
         if self.frames is None:
-            return read_fields(self.files, pressures, self.options, self.format, numbers)
+            return read_fields(self.files, pressures, self.options, self.format, numbers, count)
         frames = frames_in_memory(self.frames, self.options)
         if numbers is not None:
             frames = tuple(frames[number] for number in numbers)
@@ -192,7 +196,7 @@ def _check_counts(
     # Where no data are needed, the files may not be there to be counted; arrays are counted before.
     if not pressures or place.measured is not None or not (files or place.need_data):
         return
-    if len(files) == len(pressures) or (len(files) == 1 and not has_inflations):
+    if len(files) in (1, len(pressures)):
         return
     problem = f"expected one file for each of the {len(pressures)} pressures, got {len(files)}"
     if points.files is not None:

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import InputError
 from ...light_dataclasses import dataclass
 from ...readers.clock_offset import ClockOffset, find_offset, given_offset
+from ...readers.fields import check_count, without_frame_at_rest
 from ...readers.frames import (
     Frame,
     FrameOptions,
@@ -251,7 +252,14 @@ def _heights(recording: Recording, files: FrameFiles) -> Array:
     """Return the heights (frames,) mm of the apex in all frames."""
     if recording.clock is not None:
         return recording.clock.heights
-    return np.array([apex_height(frame) for _, frames in files.read() for frame in frames])
+    heights: list[float] = []
+    for _, frames in files.read():
+        if len(files.files) == 1:
+            frames = without_frame_at_rest(frames, len(recording.names))
+            with files.place.errors_name("data.points"):
+                check_count(frames, len(recording.names))
+        heights += map(apex_height, frames)
+    return np.array(heights)
 
 
 # Pressures --------------------------------------------------------------------------------------
@@ -273,8 +281,10 @@ def _recorded_pressures(section: PressureSection, files: FrameFiles) -> Recordin
 
 
 def _listed_pressures(pressures: Sequence[float], files: FrameFiles) -> Recording:
-    """Return the pressures listed in a project, one for each file, or frame in memory."""
+    """Return the pressures listed in a project, one for each file, or frame of one or in memory."""
     names = [file.name for file in files.files]
+    if len(names) == 1:
+        names = _frame_names(names[0], len(pressures))
     frame_names = names or [f"frame {number}" for number in range(1, len(pressures) + 1)]
     return Recording(np.array(pressures), frame_names, "the list 'pressures'")
 

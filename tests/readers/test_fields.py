@@ -265,6 +265,22 @@ def test_inconsistent_arguments_of_fields_are_refused(field_file, change, field)
     assert field in complaint(read, **change)
 
 
+def test_chosen_frames_of_a_file_are_counted_without_a_first_one_at_rest(tmp_path):
+    path = tmp_path / "all.csv"
+    moved = "".join(f"{k},{x},{y},0,0,{k}\n" for k in range(4) for x in (0, 1) for y in (0, 1, 2))
+    path.write_text(f"frame,x,y,dx,dy,dz\n{moved}")
+
+    def chosen(count):
+        options = replace(PLAIN, columns=None)
+        return read_fields([path], [0.1, 0.3], options, frames=[0, 2], count=count)
+
+    for count, rises in ((3, [1, 3]), (4, [0, 2])):
+        assert [field.displacement[1, 2] for field in chosen(count)] == rises
+    for count in (2, 5):
+        words = f"files: expected one frame for each of {count} pressures, found 4"
+        assert complaint(chosen, count) == words
+
+
 def test_measured_fields_are_read_completely(shared_data):
     with open(shared_data / "bubble/grid_pressures.csv", newline="") as stream:
         pressures = [float(row["p_MPa"]) for row in csv.DictReader(stream)]

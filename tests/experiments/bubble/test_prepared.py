@@ -134,6 +134,35 @@ def test_first_inflation_is_taken_by_default(inflations_folder):
     complaint_with(["bubble[0].inflation"], prepare_fit, read, list(read.tests.values()))
 
 
+@pytest.mark.parametrize("has_rest", [False, True])
+def test_one_file_of_all_frames_of_inflations_is_read_as_a_file_each(
+    inflations_folder, tmp_path, has_rest
+):
+    rows = []
+    for k, p in enumerate(KILO, 1):
+        table = np.loadtxt(inflations_folder / f"step_{k}_{p:g}kPa.csv", delimiter=",", skiprows=1)
+        rows.append(np.column_stack([np.full(len(table), k), table]))
+    if has_rest:
+        rows.insert(0, rows[0] * [0, 1, 1, 0, 0, 0])
+    header = "frame,x,y,dx,dy,dz"
+    np.savetxt(tmp_path / "step.csv", np.vstack(rows), "%.14g", ",", header=header, comments="")
+    listed = f"pressures = {KILO}\ninflation = 2"
+    (expected,) = inflations_project(inflations_folder, listed, "").tests.values()
+    project = inflations_project(tmp_path, listed, "")
+    (test,) = project.tests.values()
+    assert test.pressures == expected.pressures
+    fields, expected_fields = (t.data.read_fields(t.pressures) for t in (test, expected))
+    for field, expected_field in zip(fields, expected_fields, strict=True):
+        np.testing.assert_array_equal(field.points, expected_field.points)
+        np.testing.assert_array_equal(field.displacement, expected_field.displacement)
+    assert any("inflation 2 of 2" in line for line in bf.check(project, out=tmp_path).lines())
+    taken = test.data.recorded
+    assert (taken.names[0], taken.count) == ("step.csv, frame 8", len(KILO))
+    words = ["bubble[0].data.points.files", "each of 10 pressures, found"]
+    listed = f"pressures = {[*KILO[:8], *KILO[9:]]}\ninflation = 2"
+    complaint_with(words, inflations_project, tmp_path, listed, "")
+
+
 def test_check_shows_conditioning_of_the_sheet(inflations_folder, inflation_history, tmp_path):
     found = bf.check(inflations_project(inflations_folder), out=tmp_path)
     lines = [line for line in found.lines() if "inflation 2 at" in line]
