@@ -51,9 +51,19 @@ def pytest_collection():
         gc.enable()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    """Have each process of a run begin with other files of a folder than the others do."""
+    report = yield
+    if isinstance(collector, pytest.Directory) and report.passed:
+        report.result = shared_work.rotated(report.result)
+    return report
+
+
 def pytest_collection_modifyitems(config, items):
     mark_slow(items)
     if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: item.path)  # in each process alike
         longest_first(items)
     if config.getoption("--only-golden"):
         items[:] = [item for item in items if "golden" in getattr(item, "fixturenames", ())]
