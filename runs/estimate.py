@@ -224,6 +224,8 @@ def _fit(
         # variance, and values that err together weigh as one.
         root_of_size = np.sqrt(np.repeat(objective.sizes, objective.sizes))
         factors.append(objective.scale * root_of_size / (objective.correlated_count * noise))
+    priors = [n for n in unweighted.unknowns.nuisance.all if n.prior is not None]
+    factors.append(np.array([len(priors) ** 0.5 / nuisance.weight for nuisance in priors]))
     problem = WeightedProblem.of(unweighted, np.concatenate(factors))
     # The start is the point within all bounds nearest to moduli in the middle of their bounds, by
     # which unknowns are scaled: there all of them are 1.

@@ -7,12 +7,14 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.check import check
 from bubblefit.runs.estimate import GAP, closed_form_coefficients, estimate_of, with_start
 from bubblefit.storage.writing import json_text
 
 from ..builders.projects import edited_project, fit_setup, project_file
+from ..builders.unknowns import project as project_with_unknowns
 from ..support.commands import in_process
 from ..support.paths import EXAMPLES, KNOWN
 from ..support.refusals import raised
@@ -118,6 +120,22 @@ def test_start_is_in_closed_form_where_virtual_work_gives_none(known, monkeypatc
     monkeypatch.setattr(type(known.tests[0]), "virtual_work", refuse)
     setup = replace(known, project=known.project.with_fit(starts_from="estimate"))
     assert (with_start(setup).starts.coefficients == coefficients).all()
+
+
+@pytest.mark.parametrize("name", ["nu12", "thickness"])
+def test_unknown_with_prior_is_estimated_and_keeps_its_sigma(tmp_path, name):
+    changes = (("nu12 = 0.0", "nu12 = 0.2"),)
+    project = project_with_unknowns(tmp_path, f"{name} = {{ prior = 0.05 }}", *changes)
+    found = estimate_of(fit_setup(project))
+    noise = Noise.from_residual(found.problem, found.best.point.residual)
+    assert (noise.residual_sigma * found.problem.scale)[-1] == pytest.approx(0.05)
+    fit = bf.fit(project, starts=1, starts_from="estimate", jobs=1)
+    for modulus in ("E1", "E2"):
+        fitted = fit.law.modulus(modulus, 0.05)
+        assert found.law.modulus(modulus, 0.05) == pytest.approx(fitted, rel=0.1)
+    assert found.law.nu12 == pytest.approx(0.2, abs=0.05)
+    checked = check(project.with_fit(starts_from="estimate"))
+    assert "one: fine: nothing doubtful" in checked.lines()
 
 
 def test_check_begins_with_modulus_in_closed_form(known):
