@@ -70,8 +70,19 @@ SIZES = {
 #: Units with which files that name none are looked at; a project asks for theirs.
 ASSUMED_UNITS = {STRIPS: "N", LOG: "kPa"}
 
-#: A direction in a name: an angle with its unit, or a word.
-DIRECTION = re.compile(r"\d+(?:[.,]\d+)?(?=[ _]?(?:deg|grad|°(?! ?c)))|[^\W\d_]+")
+#: A direction in a name or a head, in small letters: an angle with its unit, or a word.
+DIRECTION = re.compile(
+    r"\d+(?:[.,]\d+)?(?=[ _]?(?:deg|grad|°)"
+    r"(?![a-z]*\.?[ _]?(?:c(?:elsius)?|f(?:ahrenheit)?)(?![^\W_])))|[^\W\d_]+"
+)
+
+#: A temperature, whose unit may be "deg" alone.
+TEMPERATURE = re.compile(r"temp(?:[eé]rature?)?(?![^\W\d_])[^\n\d]{0,30}\d[\d.,]*")
+
+#: A line of a head that says the direction, in small letters.
+LINE_OF_DIRECTION = re.compile(
+    r"(?m)^[^\n:;=,\t]*(?:direction|richtung|\bsens\b|orientation)[^\n:;=,\t]*[:;=,\t](.*)"
+)
 
 #: Angles of strips, degrees, are multiples of it.
 ANGLE_STEP = 7.5
@@ -108,6 +119,12 @@ class FileGroup:
     content: Any
     unit: str | None
     names: Sequence[str]
+
+    @property
+    def file_names(self) -> list[str]:
+        """Return the name of each file, in the folder of the data."""
+        folder = Path(self.names[0]).parent
+        return [(folder / file.name).as_posix() for file in self.files]
 
     @property
     def line(self) -> str:
@@ -314,6 +331,10 @@ def _recognised(files: Sequence[Path], pattern: Path, data: Path) -> FileGroup:
     return FileGroup(files, "", problem, None, names)
 
 
+#: Name of a file in the folder of the data, and the unit that is assumed as it names none.
+FileWithUnit = tuple[str, str | None]
+
+
 def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
     """Return the tests for which there are files, as values of the templates of their kinds.
 
@@ -321,11 +342,10 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
     """
     of_role = {role: [group for group in groups if group.role == role] for role in READERS}
     tests = []
+    logs, times = _files_with_units(of_role[LOG]), _files_with_units(of_role[TIMES])
     for number, group in enumerate(of_role[FRAMES]):
         # The log of the same number, or the last one where there are fewer.
-        logs = of_role[LOG][: number + 1][-1:]
-        times = of_role[TIMES][: number + 1][-1:]
-        tests.append(_bubble(group, logs, times))
+        tests.append(_bubble(group, logs[: number + 1][-1:], times[: number + 1][-1:]))
     tests += _gauge_bubbles([g for role in (HEIGHTS, PROFILES, APEX) for g in of_role[role]])
     tests += _strips(of_role[STRIPS])
     bent = {"kind": "cylinder", "sizes": ["diameter", "pressure"]}
@@ -333,8 +353,15 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
     return [*tests, *({**bent, "files": group.names} for group in of_role[BENDING])]
 
 
-def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGroup]) -> Settings:
-    """Return the values of a bubble; of logs and tables of times, the last is its."""
+def _files_with_units(groups: Sequence[FileGroup]) -> list[FileWithUnit]:
+    """Return the files of all groups, by name in the folder of the data, with the assumed units."""
+    return [(name, group.unit) for group in groups for name in group.file_names]
+
+
+def _bubble(
+    group: FileGroup, logs: Sequence[FileWithUnit], times: Sequence[FileWithUnit]
+) -> Settings:
+    """Return the values of a bubble, with at most one log and one table of times."""
     first = group.files[0]
     frame = group.content[0]
     points = np.nan_to_num(frame.points[np.isfinite(frame.points[:, :2]).all(axis=1)])
@@ -342,13 +369,15 @@ def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGro
     is_named = _can(number_in_name, first, PRESSURE_UNITS)
     is_timed = _can(number_in_name, first, TIME_UNITS)
     columns = [c for c in PRESSURE_COLUMNS if _can(values_in_file, first, c, PRESSURE_UNITS)]
+    is_in_frames = bool(is_named or columns)
+    if is_in_frames:
+        logs = []
     sizes = ["radius"]
-    if not (is_named or logs or columns):
+    if not (is_in_frames or logs):
         sizes.append("pressures")
-    elif not (is_named or times or is_timed or columns):
+    elif logs and not (times or is_timed):
         sizes.append("rate")
-    if logs and logs[-1].unit and not is_named:
-        sizes.append("pressure_unit")
+    sizes += ["pressure_unit" for _, unit in logs if unit]
     return {
         "kind": "bubble",
         "files": group.names,
@@ -399,12 +428,13 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     sizes_in_heads: dict[str, set[float]] = {}
     by_angle = False
     for group in groups:
-        for size, value in _sizes_in_head(group.files[0]).items():
-            sizes_in_heads.setdefault(size, set()).add(value)
-        is_word = len(group.content) > 1 or _direction_word(group.files[0]).isalpha()
-        for direction, names in _files_by_direction(group).items():
+        for file in group.files:
+            for size, value in _sizes_in_head(file).items():
+                sizes_in_heads.setdefault(size, set()).add(value)
+        files_by_direction, is_by_angle = _files_by_direction(group)
+        for direction, names in files_by_direction.items():
             files.setdefault(direction, []).extend(names)
-            by_angle |= not is_word and direction not in ("", "bias")
+            by_angle |= is_by_angle and direction not in ("", "bias")
     unknown = files.pop("", [])
     if not files:
         return []
@@ -439,19 +469,37 @@ def angle_of(direction: str) -> float:
     return angles[direction] if direction in angles else float(direction.partition(" ")[0])
 
 
-def _files_by_direction(group: FileGroup) -> dict[str, list[str]]:
-    """Return the names of a group's files by the direction of the strips, "" if none is known."""
-    if len(group.content) > 1:
-        return {curve.direction: [*group.names] for curve in group.content}
-    word = _direction_word(group.files[0])
-    if word:
-        return {direction_named(word if word.isalpha() else f"{word} deg"): [*group.names]}
+def _files_by_direction(group: FileGroup) -> tuple[dict[str, list[str]], bool]:
+    """Return the names of a group's files by the direction of the strips, "" if none is known.
+
+    The second value says whether it is known from angles.
+    """
+    in_columns = {curve.direction: [*group.names] for curve in group.content}
+    if len(in_columns) > 1:
+        return in_columns, False
+    words = [word for word in map(_direction_word, group.files) if word]
+    directions = _directions_by_words(group.files) if words else _directions_by_numbers(group.files)
     by_direction: dict[str, list[str]] = {}
-    folder = Path(group.names[0]).parent
-    for file, angle in zip(group.files, _angles_in_names(group.files), strict=True):
-        direction = "" if angle is None else direction_named(angle)
-        by_direction.setdefault(direction, []).append((folder / file.name).as_posix())
-    return by_direction if len(by_direction) > 1 else {"": [*group.names]}
+    for name, direction in zip(group.file_names, directions, strict=True):
+        by_direction.setdefault(direction, []).append(name)
+    if len(by_direction) == 1:
+        by_direction = {directions[0]: [*group.names]}
+    return by_direction, not words or not all(map(str.isalpha, words))
+
+
+def _directions_by_words(files: Sequence[Path]) -> list[str]:
+    """Return the direction of each file that a word or an angle with its unit says, or ""."""
+    directions = []
+    for word in map(_direction_word, files):
+        name = word if word.isalpha() else f"{word} deg"
+        directions.append(direction_named(name) if word else "")
+    return directions
+
+
+def _directions_by_numbers(files: Sequence[Path]) -> list[str]:
+    """Return the direction of each file by the angle in its name, or ""."""
+    angles = _angles_in_names(files)
+    return ["" if angle is None else direction_named(angle) for angle in angles]
 
 
 def _angles_in_names(files: Sequence[Path]) -> Sequence[float | None]:
@@ -465,9 +513,15 @@ def _angles_in_names(files: Sequence[Path]) -> Sequence[float | None]:
 
 
 def _direction_word(file: Path) -> str:
-    """Return the first word or angle for a direction in a file's name, folder or head, or ""."""
-    text = f"{file.stem} {file.parent.name} {_head(file)}".casefold()
-    for word in DIRECTION.findall(text):
+    """Return the first word or angle for a direction, or "".
+
+    A line of the head that says the direction counts before the file's name, its folder and the
+    other lines.
+    """
+    head = _head(file).casefold()
+    text = f"{file.stem} {file.parent.name}".casefold()
+    text = "\n".join([*LINE_OF_DIRECTION.findall(head), text, head])
+    for word in DIRECTION.findall(TEMPERATURE.sub("", text)):
         is_angle = word[0].isdigit() and parse_number(word) <= 90
         if is_angle or word in DIRECTION_ALIASES:
             return word.replace(",", ".")
@@ -479,6 +533,7 @@ def _sizes_in_head(file: Path) -> dict[str, float]:
     sizes = {}
     for size, words in SIZES.items():
         statement = rf"(?i)(?:{words})[^\n]{{0,30}}?[\s;:=,\"]({NUMBER})[\s;,\"]*(mm|cm|in)\b"
+        statement += r"(?!\s*(?:/|per|pro))"  # no speed
         if (match := re.search(statement, _head(file))) is not None:
             sizes[size] = parse_number(match[1]) * LENGTH_UNITS[match[2]]
     return sizes
@@ -486,4 +541,5 @@ def _sizes_in_head(file: Path) -> dict[str, float]:
 
 def _head(file: Path) -> str:
     """Return the beginning of a file as text, whatever its encoding."""
-    return file.read_bytes()[:4000].decode("utf-8", errors="replace")
+    with file.open("rb") as stream:
+        return stream.read(4000).decode("utf-8", errors="replace")

@@ -285,6 +285,55 @@ def test_unit_of_a_pressure_log_that_names_none_is_left_to_the_user(tmp_path, mo
     assert low < 640.0 < high
 
 
+def test_frames_that_name_their_pressure_need_no_log(tmp_path):
+    """A log beside them, by a clock that nothing ties to the frames, is not taken."""
+    data = tmp_path / "data"
+    data.mkdir()
+    x, y = (90.0 * c for c in np.meshgrid(*[np.linspace(-1.0, 1.0, 15)] * 2))
+    flat = np.column_stack([x.ravel(), y.ravel()])[np.hypot(x, y).ravel() < 98.0]
+    parabola = 1.0 - (flat**2).sum(axis=1, keepdims=True) / 1e4
+    for number, mbar in enumerate((0, 500, 1000, 1500)):
+        rise, strain = 0.02 * mbar, 0.06 * (mbar / 1500) ** 2
+        heights = np.zeros((len(flat), 1))
+        columns = [flat, heights, strain * parabola * flat, rise * parabola]
+        rows = [";".join(f"{value:.4f}" for value in row) for row in np.hstack(columns)]
+        head = [f"Druck [mbar];{mbar}", "X [mm];Y [mm];Z [mm];dX [mm];dY [mm];dZ [mm]"]
+        (data / f"Probe1_{number:03d}.csv").write_text("\n".join([*head, *rows]))
+    log = ["Zeit [s];Druck [mbar]", *(f"{t};{50 * t}" for t in range(40))]
+    (data / "Druck1.csv").write_text("\n".join(log))
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.8, "--radius", 100)
+    in_process(*run, cwd=tmp_path)
+    (bubble,) = table_of(tmp_path)["bubble"]
+    assert bubble["pressures"] == [50.0, 100.0, 150.0]
+    assert bubble["data"]["points"]["pressure"] == {"column": "Druck"}
+    assert "Next: " in in_process("check", "fabric", cwd=tmp_path).stdout
+
+
+def test_each_of_two_bubbles_has_its_log_and_times(tmp_path, monkeypatch):
+    monkeypatch.setattr(start, "_law_for_data", lambda project: {})
+    data = tmp_path / "data"
+    log = (DATA / "pressure.csv").read_text()
+    for number in (1, 2):
+        shutil.copytree(DATA / "bubble", data / f"bubble{number}")
+        shutil.copy(DATA / "camera.csv", data / f"camera{number}.csv")
+        unit = {1: "bar", 2: "psi"}[number]
+        (data / f"Druck{number}.csv").write_text(log.replace("Druck [bar]", f"Druck [{unit}]"))
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83, "--radius", 100)
+    in_process(*run, cwd=tmp_path)
+    bubbles = table_of(tmp_path)["bubble"]
+    for number, bubble in enumerate(bubbles, 1):
+        points = bubble["data"]["points"]
+        assert points["files"] == [f"bubble{number}/Bubble-*_*.csv"]
+        names = {"file": f"Druck{number}.csv", "times": f"camera{number}.csv"}
+        assert points["pressure"]["log"] == names
+    first, second = (max(bubble["pressures"]) for bubble in bubbles)
+    assert second / first == pytest.approx(0.0689476, rel=0.01)
+    project = read_project(tmp_path / "fabric" / "project.toml")
+    assert [1e3 * max(test.pressures) for test in project.tests.values()] == pytest.approx(
+        [first, second], rel=1e-3
+    )
+
+
 def test_examples_of_init_have_no_broken_links(tmp_path):
     for example in start.KINDS:
         in_process("init", example, "--example", example, cwd=tmp_path)

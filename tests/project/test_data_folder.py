@@ -82,6 +82,77 @@ def test_angles_of_strips_stand_in_names(tmp_path):
     assert strips["cuts"] == ["warp", "bias"] and strips["by_angle"]
 
 
+def strips_with_heads(folder, heads):
+    """Write load curves with these lines above them by name; return the test proposed for all."""
+    folder.mkdir(exist_ok=True)
+    for name, head in heads.items():
+        curve = ["Extensometer [mm];Kraft [N]", *(f"{u / 4};{30 * u}" for u in range(20))]
+        (folder / name).write_text("\n".join([head, *curve]) + "\n", encoding="utf-8")
+    (test,) = proposed_tests(recognised_groups(folder))
+    return test
+
+
+def test_direction_is_that_of_each_file_of_a_numbered_group(tmp_path):
+    words = ("Kette", "Kette", "Schuss", "Schuss")
+    heads = {f"Specimen_{k}.csv": f"Richtung;{word}" for k, word in enumerate(words, 1)}
+    test = strips_with_heads(tmp_path / "four", heads)
+    assert test["files"] == {
+        "warp": ["Specimen_1.csv", "Specimen_2.csv"],
+        "fill": ["Specimen_3.csv", "Specimen_4.csv"],
+    }
+    assert not test["unknown"] and not test["by_angle"]
+    heads["Specimen_3.csv"], heads["Specimen_4.csv"] = "Richtung;90 deg", "Nr;4"
+    test = strips_with_heads(tmp_path / "mixed", heads)
+    assert test["files"]["fill"] == ["Specimen_3.csv"] and test["unknown"] == ["Specimen_4.csv"]
+    assert test["by_angle"]
+
+
+def test_specimens_in_one_file_have_the_direction_of_its_head(tmp_path):
+    rows = [f"{specimen};{u / 4};{30 * u}" for specimen in (1, 2) for u in range(20)]
+    lines = ["Direction;weft", "Specimen;Extensometer [mm];Load [N]", *rows]
+    (tmp_path / "table.csv").write_text("\n".join(lines))
+    (test,) = proposed_tests(recognised_groups(tmp_path))
+    assert test["files"] == {"fill": ["table.csv"]}
+
+
+def test_speeds_are_no_sizes(tmp_path):
+    head = "Grip separation: 50 mm/min\nGrip distance: 200 mm"
+    test = strips_with_heads(tmp_path / "both", {"bias1.csv": head})
+    assert test["in_heads"] == {"grip_distance": 200.0}
+    rate = {"bias1.csv": "Grip separation rate: 100 mm/min"}
+    assert strips_with_heads(tmp_path / "rate", rate)["in_heads"] == {}
+
+
+def test_size_that_differs_within_a_group_stays_open(tmp_path):
+    heads = {f"warp_{w}.csv": f"Width: {w} mm\nGauge length: 100 mm" for w in (25, 30)}
+    test = strips_with_heads(tmp_path, heads)
+    assert test["files"] == {"warp": ["warp_*.csv"]}
+    assert test["in_heads"] == {"gauge_length": 100.0}
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Temperature: 23 deg C",
+        "Temperature: 23 deg",
+        "Raumtemperatur;23 Grad",
+        "Climate: 23 degC, 50 % RH",
+        "Climate: 73 deg F",
+        "Material: warp knitted PVC",
+        "Material: fill coated, 45 deg",
+    ],
+)
+def test_direction_is_that_of_its_line_in_the_head(tmp_path, head):
+    words = {"probe_a.csv": "warp", "probe_b.csv": "weft"}
+    heads = {name: f"{head}\nDirection: {word}" for name, word in words.items()}
+    test = strips_with_heads(tmp_path / "named", heads)
+    assert test["files"] == {"warp": ["probe_a.csv"], "fill": ["probe_b.csv"]}
+    if "23" in head or "73" in head:  # without a line of the direction, too
+        heads = {"probe_a.csv": f"{head}\nseries of the warp", "probe_b.csv": head}
+        test = strips_with_heads(tmp_path / "unnamed", heads)
+        assert test["files"] == {"warp": ["probe_a.csv"]} and test["unknown"] == ["probe_b.csv"]
+
+
 def table(folder, heading, rows=((10, 9.6, 7.3), (20, 12.1, 9.2), (30, 14.0, 10.1)), name="a.csv"):
     count = heading.count(",") + 1
     lines = [",".join(f"{value:g}" for value in row[:count]) for row in rows]
