@@ -354,6 +354,7 @@ def plan(
         optimum.certainty.corrected or optimum.certainty.posterior, optimum.best.law, ends
     )
     notes = [*optimum.notes, *other_thickness(material, project.fabric.thickness)]
+    notes += notes_beyond(ends, material.law.strain_range)
     offers = _offers(project, optimum, plannable, noise)
     additions = _additions(optimum, offers, specimens, notes, listener(progress))
     if not additions:

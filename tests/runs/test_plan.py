@@ -82,6 +82,16 @@ def test_information_of_strips_is_closed_form(project, few, monkeypatch):
     monkeypatch.setattr(plan_module, "kinds", lambda: {"strips": kinds()["strips"]})
     limited = replace(CARD, law=replace(CARD.law, strain_range=np.array([0.09, 0.2, 0.03])))
     np.testing.assert_allclose(plan(project, limited).ends, [0.09, 0.14, 0.03])
+    words = "is beyond the card's valid range of {} %: modulus held there"
+    for strain, beyond in (
+        (None, []),
+        (
+            PLANNED_ENDS,
+            ["warp strain 10 % " + words.format(9), "shear strain 5 % " + words.format(3)],
+        ),
+    ):
+        notes = plan(project, limited, strain=strain).notes
+        assert [note for note in notes if "card's valid range" in note] == beyond
     reached = plan(project, CARD).ends
     np.testing.assert_allclose(reached[:2], np.log([22.9 / 20] * 2), rtol=1e-3)
     # After three more specimens along the warp three more again.
