@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.states import state_from_conditioning, state_of
+from bubblefit.experiments.states import notes_of_states, state_from_conditioning, state_of
 
 from ..builders.load_histories import THREE_CYCLES, load_history, write_history
 
@@ -99,3 +99,21 @@ def test_joined_tests_at_other_rates_or_holds_are_noted(tmp_path):
     assert "timed: 0 s" in second and "cycles: 6" in second
     page = (tmp_path / "timed-cycles" / "report.html").read_text()
     assert first in page and second in page
+
+
+@pytest.mark.parametrize(
+    ("states", "words"),
+    [
+        (["first loading", "conditioned", ""], ["(a: first loading, b: conditioned)"]),
+        (["conditioned", "conditioned"], []),
+        (["", ""], []),
+    ],
+)
+def test_joined_tests_in_several_states_are_noted(states, words):
+    tests = [
+        SimpleNamespace(name=name, state=state, pace=None)
+        for name, state in zip("abc", states, strict=False)
+    ]
+    notes = [str(note) for note in notes_of_states(tests)]
+    assert len(notes) == len(words)
+    assert all(word in note for word, note in zip(words, notes, strict=True))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.readers.clock_offset import find_offset
+from bubblefit.readers.clock_offset import find_offset, given_offset
 
 from ..support.refusals import complaint
 
@@ -112,3 +112,9 @@ def test_pressure_error_is_half_the_range_of_possible_offsets(noise):
 )
 def test_undetermined_clock_offset_is_refused(change, words):
     assert words in complaint(find_offset, *recorded_heights(offset=12.0, noise=5e-4, **change))
+
+
+def test_offset_at_which_no_frame_lies_within_the_log_is_refused():
+    times, log_times = np.arange(5.0), np.linspace(10.0, 20.0, 6)
+    message = complaint(given_offset, 30.0, times, times, log_times, np.zeros(6))
+    assert "frames from 30.00 to 34.00 s by its clock, the log from 10.00 to 20.00 s" in message

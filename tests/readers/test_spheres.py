@@ -102,3 +102,12 @@ def test_used_points_lie_near_the_sphere_through_them():
         assert left.sum() == pytest.approx(0.0, abs=1e-8)
         np.testing.assert_allclose(kept.T @ left, 0.0, atol=1e-8)
         assert found.rms == pytest.approx(np.sqrt(np.mean(left**2)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_sphere_is_that_of_most_points_where_a_third_lies_elsewhere(seed):
+    points, ways, draw = ball_cap(seed=seed)
+    count = len(ways) // 3
+    points[:count] += [0.0, 0.0, 60.0] + 5.0 * draw.normal(size=(count, 3))
+    sphere = fit_sphere(points)
+    assert sphere.radius == pytest.approx(40.0, abs=1e-6) and sphere.left_out == count

@@ -70,6 +70,8 @@ def test_ambiguous_values_in_files_are_refused(tmp_path, text, words):
         ("s1_12kPa s2_35.5kPa s3_60kPa", [0, 1, 2], []),
         ("c2_00010 c2_00020 c2_00030 c2_00050", [0, 10, 20, 40], ["up by 10", "1 (40)"]),
         ("1_140201 2_140203 3_140301", [0, 1, 2], []), ("i3 i1 i2", [0, 1, 2], []),
+        # Minutes that do not rise at every frame are no counter.
+        ("12_40_1_100 12_40_2_200 12_41_3_300", [0, 1, 2], []),
     ],
 )  # fmt: skip
 def test_picture_numbers_are_read_from_names(names, numbers, words):

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -60,6 +61,8 @@ def test_specimens_are_drawn_again(drawn_again):
         1 <= s.analyses <= MAX_ANALYSES or s.counts == [[1, 1], [1, 1]] for s in done.samples
     )
     assert done.analyses == done.optimum_analyses + sum(s.analyses for s in done.samples)
+    # The process of the samples has run the analysis at the optimum once more.
+    assert done.optimum_analyses == done.optimum.analyses + 1
     few = [(FEW_UNITS, of) for of in ("one: warp", "one: fill", "")]
     assert [(n.kind, n.of) for n in done.notes] == few
     correlations = done.coefficients()
@@ -158,3 +161,11 @@ def test_bootstrap_command_writes_page_and_tables(tmp_path):
 @pytest.fixture(autouse=True)
 def without_pages(monkeypatch):
     monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
+
+
+@pytest.mark.parametrize(("count", "samples", "of"), [(4, 40, ["a"]), (5, 39, [""]), (6, 40, [])])
+def test_few_units_or_samples_are_noted(count, samples, of):
+    optimum = SimpleNamespace(notes=[])
+    groups = [SimpleNamespace(name="a", units=list(range(count)))]
+    drawn = module.Bootstrap(optimum, "specimens", groups, [None] * samples, 1)
+    assert [(note.kind, note.of) for note in drawn.notes] == [(FEW_UNITS, name) for name in of]

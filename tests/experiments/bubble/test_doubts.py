@@ -364,3 +364,26 @@ def test_strains_without_a_stiffer_yarn_are_not_doubted():
     for low, alike in ((374.0, 1), (376.0, 0)):  # geometric means: 1.5 times 500
         bounds = Expected({"E1": (500.0, 750.0 * 1000 / 500), "E2": (low, 500_000 / 375.0)})
         assert len(doubts_said(check, bounds, **plain)) == alike
+
+
+@pytest.mark.parametrize(
+    ("scale", "sure"), [(0.93, True), (0.95, False), (1.05, False), (1.07, True)]
+)
+def test_edge_far_from_the_radius_is_a_sure_doubt(scale, sure):
+    clamp = SimpleNamespace(scale=scale, still_count=9)
+    view = SimpleNamespace(clamp=clamp, outline=Outline.circle(100.0))
+    (doubt,) = doubts.clamped_elsewhere(view)
+    assert doubt.sure is sure and f"beyond an edge of radius {100 * scale:.3g} mm" in doubt.text
+
+
+@pytest.mark.parametrize(("dome", "axis"), [((8.0, 1.0, 1.5), "dx"), ((1.0, 8.0, 1.5), "dy")])
+def test_dome_along_the_sheet_is_named_where_dz_has_a_fifth_of_it(dome, axis):
+    def doubts_at(*motion):
+        motions = [SimpleNamespace(dome=np.array(motion))]
+        outline = Outline.circle(100.0)
+        view = SimpleNamespace(centre_motions=motions, outline=outline, highest_pressure=90.0)
+        return list(doubts.rise_exchanged(view))
+
+    (doubt,) = doubts_at(*dome)
+    assert doubt.sure and f"exchange {axis} and dz" in doubt.text
+    assert doubts_at(*dome[:2], 1.7) == [] == doubts_at(0.3, 0.2, 0.0)

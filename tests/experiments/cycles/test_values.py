@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit import cycles
+from bubblefit.experiments.cycles.values import matched_rows
 from bubblefit.readers.histories import find_cycles, find_holds, read_history
 
 from ...builders.load_histories import LOWEST_LOAD, THREE_CYCLES, load_history, write_history
@@ -23,6 +24,12 @@ def test_straight_branches_have_their_slopes_and_areas(plain_history_file):
         assert values == pytest.approx((up, down, up, down), rel=1e-9)
         assert (v.permanent, v.top) == pytest.approx((permanent, top - zero), rel=1e-9)
         assert (v.work, v.loss) == pytest.approx((work, work - back), rel=1e-9)
+        # The loop is narrowest at one end of the levels at which it is measured.
+        widths = [
+            kept - start + (level - LOWEST_LOAD) * (1 / down - 1 / up)
+            for level in (max(0.2 * peak, 100.0), 0.95 * peak)
+        ]
+        assert v.crossing == pytest.approx(min(widths), abs=1e-9)
         start = kept
     table = cycles(plain_history_file, width=50.0).table
     assert table["EA_loading_N_per_mm"][0] == pytest.approx((3000 - LOWEST_LOAD) / 0.010 / 50)
@@ -97,3 +104,11 @@ def test_rates_are_those_of_the_ramps_with_a_hold_and_a_clock_of_whole_seconds(t
         (hold,) = found.holds.to_dict("records")
         assert hold["at"] == "top" and hold["duration_s"] == pytest.approx(30.0, abs=1.5)
         assert np.isfinite(hold["strain_per_decade"])
+
+
+def test_rows_between_crossings_of_the_reference_load_are_matched(plain_history_file):
+    (evaluated,) = cycles(plain_history_file, reference_load=100.0).histories
+    load = evaluated.history.load
+    first, last = matched_rows(evaluated)
+    assert load[first - 1] < 100.0 <= load[first]
+    assert load[last] >= 100.0 > load[last + 1] and last > np.argmax(load)
