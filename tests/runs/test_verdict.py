@@ -205,6 +205,19 @@ def test_verdict_says_by_how_much_a_fit_misses_what_it_was_made_of(share, state)
     assert parameters.reasons == verdict.reasons
 
 
+def test_parameters_of_decks_are_known_within_a_fifth_of_their_value():
+    bands = {"C10": (500.0, 99.0), "C01": (0.5, 0.09), "D1": (-2.0, 0.41), "K": (3.0, 2.0)}
+    verdicts = [
+        SimpleNamespace(name=name, value=value, half_widths=(0.5 * half_width, half_width))
+        for name, (value, half_width) in bands.items()
+    ]
+    verdict = verdict_of_parameters(verdicts, [], {})
+    assert verdict.sentence.endswith(": C10, C01") and verdict.unknown == "D1, K"
+    assert verdict.state == "usable within limits"
+    assert verdict_of_parameters(verdicts[:2], [], {}).state == "usable"
+    assert verdict_of_parameters(verdicts[2:], [], {}).state == "not to be used"
+
+
 def test_modulus_on_its_bound_is_not_usable():
     best = best_with(GOOD)
     modulus = best.certainty.moduli["G12"]

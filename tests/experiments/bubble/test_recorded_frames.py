@@ -326,3 +326,12 @@ def test_hole_of_an_hour_in_a_log_of_a_fifth_of_a_second_is_doubted(hole, is_dou
     # A hole before the first frame tells nothing of the frames.
     early = np.where(CLOCK > 2, CLOCK, CLOCK - 3600.0)
     assert doubts(HEIGHTS, early, pressure(CLOCK)) == []
+
+
+def test_second_inflation_of_pressures_that_only_rise_is_refused(frames_folder):
+    rising = POINTS.replace("*", "p[4-9]_*")
+    section = "[bubble.data.points.pressure]\nfrom_name = true\n"
+    path = recorded_project(frames_folder, section, files=rising)
+    assert len(recorded_bubble(path).data.files) == 2  # one of each pressure
+    path.write_text(path.read_text().replace("radius", "inflation = 2\nradius"))
+    assert "bubble[0].inflation: " in complaint(recorded_bubble, path)

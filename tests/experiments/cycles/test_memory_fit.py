@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bubblefit import cycles
 from bubblefit.experiments.cycles.evaluation import evaluate_history
-from bubblefit.experiments.cycles.memory_fit import fit_cycles, left_out
+from bubblefit.experiments.cycles.memory_fit import CycleFit, fit_cycles, left_out
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, law_slopes
 from bubblefit.materials.memory import Memory, own_stress
-from bubblefit.readers.histories import LoadHistory
+from bubblefit.readers.histories import LoadHistory, read_history
 
 
 def test_known_history_gives_its_law_back():
@@ -35,6 +35,19 @@ def test_known_history_gives_its_law_back():
         own = memory.constants[4 * pulled : 4 * pulled + 4]
         assert found.memory == pytest.approx(own, rel=1e-6)
         assert found.load == pytest.approx(history.load[found.rows], abs=1e-6)
+
+
+def test_derivatives_of_a_history_with_slips_are_those_of_differences(plain_history_file):
+    evaluated = evaluate_history(read_history(plain_history_file), 100.0)
+    problem = CycleFit(evaluated, knots=4, leave=0)
+    slips = [1e-3] * len(problem.slipped)
+    x = np.array([1.1, 0.8, 0.9, 1.2, 0.4, 1.6, 0.5, 0.3, *slips])
+    jacobian = problem.jacobian(x)
+    assert jacobian.shape[1] == len(x) == 10
+    for k, step in enumerate(1e-5 * np.eye(len(x))):
+        difference = (problem.residual(x + step) - problem.residual(x - step)) / 2e-5
+        atol = 1e-4 * np.abs(difference).max()
+        np.testing.assert_allclose(jacobian[:, k], difference, atol=atol, err_msg=f"{k}")
 
 
 def test_left_out_cycles_of_straps_and_cords_are_predicted(shared_data):

@@ -113,6 +113,15 @@ def test_modulus_is_taken_at_half_of_the_strain():
     assert strip_doubts_of({"warp": strip})
 
 
+def test_modulus_is_doubted_although_a_row_goes_below_no_length():
+    """An elongation of less than minus the gauge length, as of a gauge that fell off."""
+    curve = strip_of_one_modulus("warp", 6010.0).curves[0]
+    elongation = np.append(curve.elongation, -1.5 * GAUGE)
+    fallen = replace(curve, elongation=elongation, load=np.append(curve.load, 0.0))
+    strip = replace(strip_of_one_modulus("warp", 1.0), curves=(fallen,))
+    assert any("6.01e+03 MPa" in doubt.text for doubt in strip_doubts_of({"warp": strip}))
+
+
 @pytest.mark.parametrize(("fill", "doubt"), [(459.0, 0), (461.0, 1)])
 def test_fill_stiffer_than_the_warp_is_doubted(fill, doubt):
     both = {"warp": strip_of_one_modulus("warp", 400.0), "fill": strip_of_one_modulus("fill", fill)}
