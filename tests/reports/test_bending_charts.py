@@ -147,3 +147,9 @@ def test_side_view_is_the_half_that_is_seen():
         assert scale_ends(charts.charts[0]) == pytest.approx(ends)
     charts = beam_charts(POINTS, QUADS, 0 * strain, OUTLINE, RING, BODIES)
     assert scale_ends(charts.charts[0]) == pytest.approx((0.0, 1.0))
+
+
+def test_close_view_is_at_the_last_of_two_rollers():
+    bodies = replace(BODIES, collars=(-250.0, 250.0))
+    _, close, _ = beam_charts(POINTS, QUADS, STRAIN, OUTLINE, RING, bodies).charts
+    assert axis_ends(close)[0] == pytest.approx((250.0 - 176.0, 250.0 + 176.0))

@@ -1,7 +1,9 @@
 """Pages of predictions whose models have two ends: both are run, one is judged."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from bubblefit import cycles
 from bubblefit.project.project import read_project
 from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
@@ -15,6 +17,7 @@ from ..builders.bent_cylinders import (
     write_cylinder_project,
     write_cylinder_readings,
 )
+from ..builders.load_histories import load_history, write_history
 
 
 @pytest.fixture(autouse=True)
@@ -80,3 +83,13 @@ def test_only_predicted_end_of_band_is_judged(tmp_path, monkeypatch):
     assert all(len(row) == 5 for row in notes.rows) and notes.text == (1, 2, 3, 4)
     assert {row[2] for row in notes.rows} == {"slack", "rigid wall"}
     assert ["rigid wall" in line for line in page.warnings[:2]] == [False, True]
+
+
+def test_cycles_are_written_with_their_tables_and_loops(tmp_path):
+    columns = load_history()
+    evaluation = cycles(write_history(tmp_path / "a.csv", ["time_s,load_N,strain"], columns))
+    run_pages.write_cycles(evaluation, tmp_path, is_fitted=False)
+    names = {path.name for path in tmp_path.glob("*.csv")} - {"a.csv"}
+    assert names == {"cycles.csv", "holds.csv", "notes.csv", "loops.csv"}
+    written = pd.read_csv(tmp_path / "cycles.csv")
+    np.testing.assert_allclose(written["cycle"], evaluation.table["cycle"])
