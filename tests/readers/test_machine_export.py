@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from bubblefit.readers.curves import split_at_restarts
+from bubblefit.readers.machine_export import columns_by_quantity, count_unit_rows
+from bubblefit.readers.machine_tables import TableOptions
+from bubblefit.readers.tables import Row
 from bubblefit.readers.units import split_unit
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -250,3 +253,27 @@ def test_repeated_columns_that_are_no_specimens_are_refused(export_file):
     names = {"elongation": "Extension 2 (mm)", "load": "Load 2 (kN)"}
     (curve,) = read_export(export_file, head + "0,0,0,0\n1,2,3,4\n", columns=names)
     assert curve.load.tolist() == [0, 4000]
+
+
+@pytest.mark.parametrize(("count", "expected"), [(2000, [[0], [1]]), (2001, [])])
+def test_row_of_more_than_two_thousand_cells_is_no_header(count, expected):
+    names = ["Load", "Extension", *("x" * (count - 2))]
+    options = TableOptions(quantities=("load", "elongation"))
+    assert columns_by_quantity(names, options) == expected
+
+
+@pytest.mark.parametrize(
+    ("cells", "count"),
+    [
+        ([], 0),
+        (["1,2"], 0),
+        (["N,mm"], 1),
+        (["N,mm", "1,2"], 1),
+        (["N,mm", "float,float"], 1),
+        (["N,mm", "float,float", "1,2"], 2),
+        (["N,mm", "float,float", "a,b", "1,2"], 1),
+    ],
+)
+def test_rows_of_units_are_those_in_words_above_a_reading(cells, count):
+    rows = [Row(number, row.split(",")) for number, row in enumerate(cells, start=2)]
+    assert count_unit_rows(rows, [0, 1]) == count
