@@ -43,3 +43,16 @@ def test_radius_beside_that_of_the_resting_clamp_is_doubted(clean_bubble, radius
         assert f"says radius {radius:.3g} mm" in found["radius"].text
     if not sure:
         assert ("off-centre" in found) == (off > 0)
+
+
+@pytest.mark.parametrize("y", [-2.0, 2.0])
+def test_tilts_are_estimated_from_the_mean_motion_of_a_sheet_that_rises(y):
+    def estimates(z):
+        moved = np.tile([1.0, y, z], (5, 1))
+        view = MeasuredView((field_of(0.1, moved),), CIRCLE, 0.8, False)
+        return view.registration_estimates
+
+    tilts = estimates(20.0)
+    assert tilts["tilt_x"] == pytest.approx(np.degrees(np.arctan2(-y, 20.0)))
+    assert tilts["tilt_y"] == pytest.approx(np.degrees(np.arctan2(1.0, np.hypot(y, 20.0))))
+    assert {"tilt_x", "tilt_y"}.isdisjoint(estimates(-20.0))
