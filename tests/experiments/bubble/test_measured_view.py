@@ -48,11 +48,11 @@ def test_radius_beside_that_of_the_resting_clamp_is_doubted(clean_bubble, radius
 @pytest.mark.parametrize("y", [-2.0, 2.0])
 def test_tilts_are_estimated_from_the_mean_motion_of_a_sheet_that_rises(y):
     def estimates(z):
-        moved = np.tile([1.0, y, z], (5, 1))
-        view = MeasuredView((field_of(0.1, moved),), CIRCLE, 0.8, False)
-        return view.registration_estimates
+        first, last = np.tile([0.0, 0.0, 0.2 * z], (5, 1)), np.tile([1.0, y, z], (5, 1))
+        fields = field_of(0.01, first), field_of(0.1, last)
+        return MeasuredView(fields, CIRCLE, 0.8, False).registration_estimates
 
     tilts = estimates(20.0)
-    assert tilts["tilt_x"] == pytest.approx(np.degrees(np.arctan2(-y, 20.0)))
-    assert tilts["tilt_y"] == pytest.approx(np.degrees(np.arctan2(1.0, np.hypot(y, 20.0))))
+    assert tilts["tilt_x"] == pytest.approx(np.degrees(np.arctan2(-y, 16.0)))
+    assert tilts["tilt_y"] == pytest.approx(np.degrees(np.arctan2(1.0, np.hypot(y, 16.0))))
     assert {"tilt_x", "tilt_y"}.isdisjoint(estimates(-20.0))
