@@ -10,14 +10,14 @@ from bubblefit.errors import SolverFailure
 from bubblefit.project.project import read_project
 from bubblefit.runs import held_out as held_out_module
 from bubblefit.runs.simulation import FAILED
-from bubblefit.runs.validation import held_out
+from bubblefit.runs.validation import held_out, omittable_parts
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..builders.closed_forms import LAW
 from ..builders.gauges import LAW as STIFF_LAW
 from ..builders.gauges import PRESSURES, THICKNESS, gauge_heights
-from ..builders.projects import fit_setup, known_bubble
+from ..builders.projects import constant_strips, fit_setup, known_bubble
 
 
 def history(warp, shear, unstable=()):
@@ -68,6 +68,23 @@ def test_error_is_of_data_alone_without_priors():
     setup = fit_setup(bf.Project.of(bubble, law, fabric=bf.Fabric("", THICKNESS)))
     found = held_out(setup.tests[0], STIFF_LAW, setup.make_solver)
     assert found.error == pytest.approx(found.rms["bubble"] / heights.max(), rel=1e-9)
+
+
+def test_part_is_judged_with_the_shared_value_of_another_part(tmp_path):
+    """A compliance fitted to the warp, far from its start, counts for the fill as if stated."""
+    fitted = {"one: warp": {"compliance of one": 4e-4}}
+    unknown = "compliance = 2e-4\ncompliance_prior = 1e-4\n"
+    errors = []
+    for keys, nuisance in (("compliance = 4e-4\n", {}), (unknown, fitted), (unknown, {})):
+        test = ('name = "one"\n', f'name = "one"\n{keys}')
+        whole = [(", final_length = 22.9", "")] * 2
+        setup = fit_setup(constant_strips(tmp_path, test, *whole), "one")
+        _, fill = omittable_parts(setup, "directions")
+        found = held_out(setup.tests[0], LAW, setup.make_solver, fill.alone, nuisance)
+        errors.append(found.error)
+    stated, shared, at_start = errors
+    assert abs(at_start - stated) > 0.02 * stated
+    assert shared == pytest.approx(stated, rel=2e-3)
 
 
 def test_failed_law_is_reported(project, monkeypatch):
