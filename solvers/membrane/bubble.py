@@ -271,10 +271,13 @@ class Inflation(Loading):
         stiffness = 0.5 * float(np.median(membrane.section)) * (moduli[0] + moduli[1])
         # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
         height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)
-        dome = np.zeros_like(membrane.reference)
-        dome[:, 2] = 1.0 - rim_share(form, membrane.reference[:, :2]) ** 2
+        plane = membrane.reference[:, :2]
+        dome = 1.0 - rim_share(form, plane)[:, None] ** 2
+        # The motion in the plane, -w grad(w)/3, makes the strain along radii of a rise w uniform.
+        outwards = 2.0 / 3.0 * dome * (plane @ form)
         for factor in self.first_heights:
-            start = factor * height * dome
+            rise = factor * height
+            start = np.hstack([rise**2 * outwards, rise * dome])
             start.reshape(-1)[fixed] = 0.0
             displacement = self.equilibrium(start, level)
             if displacement is not None:

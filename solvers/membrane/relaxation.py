@@ -19,7 +19,10 @@ class ViscousRelaxation:
 
     initial: float = 20.0  #: the first step hardly moves
     decrease: float = 0.3  #: factor after a converged step
-    increase: float = 8.0  #: factor after a failed step
+    increase: float = 4.0  #: factor after a failed step
+    #: From there it falls to this multiple of the viscosity that failed, less with every step.
+    above_failed: float = 2.0
+    failed_decrease: float = 0.8
     max_steps: int = 60  #: largest number of steps, converged and failed ones
     smallest: float = 1e-3  #: smallest viscosity
     largest: float = 1e5  #: largest viscosity: the search fails beyond it
@@ -46,12 +49,14 @@ def settled(
     unit = membrane.pressure / facet
     viscosity = settings.initial * unit
     u = start
+    lowest = settings.smallest * unit
     static_motion = settings.static_motion * facet
     try:
         for _ in range(settings.max_steps):
             membrane.drag(viscosity, u)
             viscous = membrane.equilibrium(u, membrane.pressure)
             if viscous is None:
+                lowest = settings.above_failed * viscosity
                 viscosity *= settings.increase
                 if viscosity > settings.largest * unit:
                     return None
@@ -60,7 +65,8 @@ def settled(
             u = viscous
             is_fast = motion > static_motion
             is_viscous = viscosity > settings.static_below * unit
-            viscosity = max(settings.decrease * viscosity, settings.smallest * unit)
+            viscosity = max(settings.decrease * viscosity, lowest)
+            lowest = max(settings.failed_decrease * lowest, settings.smallest * unit)
             if is_viscous or is_fast:
                 continue
             membrane.drag(0.0, u)
