@@ -200,6 +200,7 @@ class BubbleTest(SectionTest):
         "displacement_offset",
         "pressure_offset",
         "weight",
+        "noise",
     )
 
     outline: Outline

@@ -80,6 +80,7 @@ class StripsTest(SectionTest):
         "match_by",
         "objective",
         "weight",
+        "noise",
     )
 
     width: float

@@ -32,6 +32,7 @@ def test_settings_of_strips_are_those_a_result_depends_on(published_strips, tmp_
         ("[data]", "[bias]\nfinal_length = 30.0\n[warp]\n[fill]\n[data]"),
         ('objective = "N"', 'objective = "relative"'),
         ("bias_angle = 45.0", "bias_angle = 44.0"),
+        ("bias_angle = 45.0", "bias_angle = 45.0\nnoise = 0.7"),
     ):
         assert settings(change) != own, change
 

@@ -34,7 +34,7 @@ from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ..builders.projects import fit_setup, project_file
+from ..builders.projects import constant_strips, fit_setup, project_file
 from ..support.refusals import complaint, raised
 
 PROJECT = """
@@ -120,11 +120,22 @@ def refused(first, setup):
         ("elements = 48", "elements = 108", "tests.first.elements = 48, now 108"),
         ("radius = 100", "symmetry = 'quarter'\nradius = 100",
          'tests.first.symmetry = "full", now "quarter"'),
+        ("radius = 100", "noise = 0.07\nradius = 100",
+         "tests.first.noise = not given, now 0.07"),
         ("starts = 3", "starts = 3\nmax_analyses = 9", "fit.max_analyses = not given, now 9")
     ],
 )  # fmt: skip
 def test_changed_setting_is_named_on_resumption(first, tmp_path, old, new, words):
     assert refused(first, fit_setup(written(tmp_path, (old, new)))) == words
+
+
+def test_changed_noise_of_strips_is_named_on_resumption(tmp_path):
+    def setup(noise):
+        change = ("[[strips]]", f"[[strips]]\nnoise = {noise}")
+        return fit_setup(constant_strips(tmp_path, change))
+
+    begun(tmp_path / "out", setup(0.7), False)
+    assert refused(tmp_path / "out", setup(70)) == "tests.one.noise = 0.7, now 70.0"
 
 
 def test_changed_data_file_is_named_on_resumption(first, tmp_path):
