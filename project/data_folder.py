@@ -6,6 +6,7 @@ assumed, with a remark that the written project shows.
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -542,4 +543,8 @@ def _sizes_in_head(file: Path) -> dict[str, float]:
 def _head(file: Path) -> str:
     """Return the beginning of a file as text, whatever its encoding."""
     with file.open("rb") as stream:
-        return stream.read(4000).decode("utf-8", errors="replace")
+        content = stream.read(4000)
+    try:  # the last letter may be cut
+        return codecs.getincrementaldecoder("utf-8")().decode(content)
+    except UnicodeDecodeError:
+        return content.decode("latin-1")

@@ -1,4 +1,4 @@
-"""Find out which quantity a column holds, by the words of its name in English and German.
+"""Find out which quantity a column holds, by words in English, German and French.
 
 Test machines name a load or an elongation; headings of image correlation (DIC) name a component,
 its unit and the state of the sheet.
@@ -15,14 +15,15 @@ from .units import MAX_NAME_LENGTH, STRAIN_UNITS, split_unit
 
 #: Largest number of names in a header row.
 MAX_COLUMNS = 2000
-#: Words that make a column one of these quantities, in English and German exports.
+#: Words that make a column one of these quantities, in English, German and French exports.
 WORDS = {
     quantity: frozenset(words.split())
     for quantity, words in {
         "elongation": "elongation extension displacement disp crosshead stroke travel position"
-        " weg standardweg traversenweg verfahrweg kolbenweg längenänderung",
+        " weg standardweg traversenweg verfahrweg kolbenweg längenänderung"
+        " déplacement deplacement allongement",
         "load": "load force kraft standardkraft prüfkraft",
-        "time": "time zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
+        "time": "time zeit temps prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
         "height": "height apex rise deflection h z dz gauge laser höhe stich wölbung durchbiegung"
@@ -33,8 +34,8 @@ WORDS = {
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
 LOADS = frozenset("n f force load kraft stress spannung tension".split())
 STRAINS = frozenset("eps epsilon strain dehnung".split())
-WARP = frozenset("w warp kette x".split())
-FILL = frozenset("f fill weft schuss y".split())
+WARP = frozenset("w warp kette chaîne chaine x".split())
+FILL = frozenset("f fill weft schuss trame y".split())
 #: Quantities that need a word of each of two sets.
 PAIRS = {
     f"{yarn} {measured}": (words, along)
@@ -47,21 +48,24 @@ PAIRS = {
 #: "Axial Displacement" of MTS, "Standardweg" of Zwick).
 ON_THE_STRIP = frozenset(
     "extensometer videoextensometer laserextensometer gauge gage video ave dic längenänderung"
-    " feindehnung feindehnungsaufnehmer feinweg wegaufnehmer feinwegaufnehmer dehnungsaufnehmer"
-    " ansetzaufnehmer extensometerweg videoxtens laserxtens makroxtens multixtens lightxtens"
-    " optixtens".split()
+    " extensomètre feindehnung feindehnungsaufnehmer feinweg wegaufnehmer feinwegaufnehmer"
+    " dehnungsaufnehmer ansetzaufnehmer extensometerweg videoxtens laserxtens makroxtens"
+    " multixtens lightxtens optixtens".split()
 )
 OF_THE_MACHINE = frozenset(
     "crosshead stroke position travel actuator traversenweg traversenposition traverse verfahrweg"
     " kolbenweg".split()
 )
-BETWEEN_GRIPS = frozenset("extension displacement disp weg standardweg".split())
+BETWEEN_GRIPS = frozenset(
+    "extension displacement disp weg standardweg déplacement deplacement".split()
+)
 #: "Extension (Strain 1)" is of the first transducer of strain, "(Extension)" of the crosshead.
 _TRANSDUCER = re.compile(r"\((?:strain|dehnung) ?\d*\)")
-STRAIN_WORDS = frozenset(("strain", "dehnung"))
+STRAIN_WORDS = frozenset(("strain", "dehnung", "déformation"))
 #: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
 OTHER_QUANTITIES = STRAIN_WORDS | frozenset(
-    "stress rate speed velocity time cell cycle spannung zeit geschwindigkeit".split()
+    "stress rate speed velocity time cell cycle spannung zeit geschwindigkeit contrainte temps"
+    " vitesse".split()
 )
 #: A column with one of these words is no elongation and no strain along the strip.
 NOT_ALONG_STRIP = (OTHER_QUANTITIES - STRAIN_WORDS) | frozenset(
@@ -82,6 +86,7 @@ LABELS = {
 #: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
 DIRECTION_ALIASES: Mapping[str, str] = {
     **{"warp": "warp", "fill": "fill", "weft": "fill", "kette": "warp", "schuss": "fill"},
+    **{"chaîne": "warp", "chaine": "warp", "trame": "fill"},
     **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias diagonal".split(), "bias"),
 }
 

@@ -19,6 +19,7 @@ from bubblefit.project.data_folder import (
     read_profiles,
     recognised_groups,
 )
+from bubblefit.readers.curves import read_load_curves
 
 from ..support.paths import EXAMPLES
 
@@ -113,6 +114,19 @@ def test_specimens_in_one_file_have_the_direction_of_its_head(tmp_path):
     (tmp_path / "table.csv").write_text("\n".join(lines))
     (test,) = proposed_tests(recognised_groups(tmp_path))
     assert test["files"] == {"fill": ["table.csv"]}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_french_files_are_read(tmp_path, encoding):
+    rows = [f"{t};{t / 4:.2f};{3 * t:.1f};1,5".replace(".", ",") for t in range(20)]
+    names = "Temps [s];Déplacement [mm];Force [daN];Vitesse de déplacement [mm/s]"
+    for number, word in enumerate(("chaîne", "trame"), 1):
+        lines = ["Essai de traction", f"Sens: {word}", names, *rows]
+        (tmp_path / f"essai_{number}.csv").write_text("\n".join(lines), encoding)
+    (test,) = proposed_tests(recognised_groups(tmp_path))
+    assert test["files"] == {"warp": ["essai_1.csv"], "fill": ["essai_2.csv"]}
+    (curve,) = read_load_curves(tmp_path / "essai_1.csv", direction="chaîne", width=50.0)
+    assert (curve.direction, curve.elongation[-1], curve.load[-1]) == ("warp", 4.75, 570.0)
 
 
 def test_speeds_are_no_sizes(tmp_path):

@@ -13,6 +13,8 @@ from bubblefit.readers.quantities import columns_by_quantity, heading_of, means,
         ("Specimen_ID", "specimen", 1), ("Specimen width", "specimen", 0), ("Preload", "load", 0),
         ("Überdruck [bar]", "pressure", 1), ("Pressure rate (bar/s)", "pressure", 0),
         ("Tensile strain (Extension)", "elongation", 0), ("Load Cell", "elongation", 0),
+        ("Déplacement [mm]", "elongation", 1), ("Force [daN]", "load", 1),
+        ("Vitesse de déplacement [mm/s]", "elongation", 0), ("Temps [s]", "time", 1),
     ],
 )  # fmt: skip
 def test_names_of_columns_mean_their_quantity(name, quantity, yes):
@@ -21,6 +23,8 @@ def test_names_of_columns_mean_their_quantity(name, quantity, yes):
 
 def test_elongation_nearest_to_the_strip_is_chosen():
     names = ["Crosshead (mm)", "Extension (mm)", "Video gauge (mm)", "Stroke", "Wegaufnehmer"]
+    french = ["Déplacement traverse [mm]", "Déplacement [mm]", "Extensomètre [mm]"]
+    assert [nearest_to_strip(french, which) for which in ([0, 1, 2], [0, 1])] == [[2], [1]]
     for which, nearest in (([0, 1, 2, 3, 4], [2, 4]), ([0, 1, 3], [1]), ([0, 3], [0, 3]), ([], [])):
         assert nearest_to_strip(names, which) == nearest
 
