@@ -507,7 +507,7 @@ class _FittedComparison:
         other_law = replace(law, thickness_change=option)
         nuisance = unknowns.nuisance_values(self.comparison.name, self.best.unknowns)
         try:
-            history = self.comparison.run(other_law, unknowns.free, nuisance, warm=False)
+            history = self.comparison.run(other_law, unknowns.free, nuisance, warm=True)
         except (InputError, SolverFailure):
             return {}
         residual = self.objective.residual(history, nuisance)

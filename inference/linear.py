@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,9 +52,9 @@ class LinearisedFit:
         Second derivative of half the weighted sum of squares along each determined direction.
     estimator : (unknowns, m) array
         Matrix whose product with weighted residuals is minus the change of the unknowns by them.
-    noise_response : (unknowns, m + k) array
-        Change of the unknowns by one standard deviation of the noise of each residual, and of each
-        of the k errors that many residuals share.
+    response : (unknowns, m) array
+        Change of the unknowns by each residual.
+    noise : Noise
     """
 
     sizes: Array
@@ -62,7 +63,24 @@ class LinearisedFit:
     undetermined: Array
     curvature: Array
     estimator: Array
-    noise_response: Array
+    response: Array
+    noise: Noise
+
+    @cached_property
+    def noise_response(self) -> Array:
+        """Return the changes of the unknowns by one standard deviation of errors.
+
+        They are (unknowns, m + k): of the noise of each residual, and of each of the k errors that
+        many residuals share.
+        """
+        return self.noise.propagated(self.response)
+
+    @property
+    def covariance(self) -> Array:
+        """Return the covariance of the unknowns, with `PRIOR` where the data say nothing."""
+        by_noise = self.noise_response @ self.noise_response.T
+        scaled = by_noise + PRIOR**2 * self.undetermined @ self.undetermined.T
+        return np.asarray(scaled * self.sizes[:, None] * self.sizes)
 
     @classmethod
     def of(
@@ -104,7 +122,8 @@ class LinearisedFit:
             undetermined=directions[:, ~is_determined],
             curvature=curvature[is_determined],
             estimator=inverse @ jacobian.T,
-            noise_response=noise.propagated(response),
+            response=response,
+            noise=noise,
         )
 
     def spread_over_curvature(self, row: Array) -> float:
@@ -201,9 +220,6 @@ def posteriors_of(
     """
     linear = LinearisedFit.of(problem, best, noise, second)
     sizes = linear.sizes
-    response = linear.noise_response
-    scaled = response @ response.T + PRIOR**2 * linear.undetermined @ linear.undetermined.T
-    covariance = scaled * sizes[:, None] * sizes
 
     # The mean without bounds follows from the objective alone, so its weights leave out the noise.
     noiseless = replace(noise, smallest_residual_sigma=np.zeros_like(best.residual))
@@ -212,7 +228,7 @@ def posteriors_of(
     def centre(residual: Array) -> Array:
         return best.unknowns - sizes * (exact.estimator @ (exact.weights * residual))
 
-    posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
+    posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), linear.covariance)
     if limit is None:
         return posterior, None
     return posterior, posterior.shifted(

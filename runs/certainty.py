@@ -21,7 +21,6 @@ from ..inference.linear import (
     has_large_residual,
     is_definite,
     limit_of,
-    posteriors_of,
     residual_of,
     second_order_terms,
 )
@@ -294,7 +293,7 @@ def certainty_of_fit(
     terms: SecondOrderTerms | None = None
     if has_large_residual(problem, residual) and not problem.solver.external:
         second = second_order_terms(problem, best, noise)
-        order = order_of(problem, best, law, reached, limit, noise, second)
+        order = order_of(problem, best, law, reached, noise, second)
         terms = second if order.used else None
     certainty = assessment.certainty(
         problem,
@@ -318,7 +317,6 @@ def order_of(
     best: Evaluation,
     law: HypoelasticLaw,
     reached: Array,
-    limit: FineMeshLimit | None,
     noise: Noise,
     second: SecondOrderTerms,
 ) -> UncertaintyOrder:
@@ -333,8 +331,6 @@ def order_of(
         Law of the optimum, whose moduli the standard deviations are relative to.
     reached : (3,) array
         Log strains (eps1, eps2, gamma12) up to which the moduli are compared.
-    limit : FineMeshLimit or None
-        Estimate of the limit of fine meshes.
     noise : Noise
     second : SecondOrderTerms
         Second derivatives of the residuals.
@@ -343,12 +339,13 @@ def order_of(
     -------
     UncertaintyOrder
     """
-    if not is_definite(LinearisedFit.of(problem, best, noise), second):
+    linear = LinearisedFit.of(problem, best, noise)
+    if not is_definite(linear, second):
         return UncertaintyOrder(False, NOT_DEFINITE, {}, second.directions, second.analyses)
-    sigmas = []
-    for terms in (None, second):
-        posterior = posteriors_of(problem, best, noise, limit, terms)[0]
-        sigmas.append(moduli_sigmas(problem.unknowns, law, reached, posterior.covariance)[1])
+    sigmas = [
+        moduli_sigmas(problem.unknowns, law, reached, fit.covariance)[1]
+        for fit in (linear, LinearisedFit.of(problem, best, noise, second))
+    ]
     changes = {}
     for name, sigma in sigmas[1].items():
         change = sigma / sigmas[0][name] - 1.0

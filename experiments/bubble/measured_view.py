@@ -4,6 +4,9 @@ Checks find doubts about the data before a fit; nothing here needs a model. Gros
 far off all others, are left out of a fit, too.
 """
 
+from __future__ import annotations
+
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -299,8 +302,25 @@ class MeasuredView:
         """Return which points (n,) of a field lie within a share of the rim's radius."""
         return self.outline.share(field.points) < share
 
+    def expecting(self, expected: Expected) -> MeasuredView:
+        """Return the view with bounds of the moduli, and with what has followed from it so far."""
+        view = copy.copy(self)
+        object.__setattr__(view, "expected", expected)
+        return view
+
+    @cached_property
+    def _outliers_by_field(self) -> dict[DisplacementField, GrossOutliers]:
+        """Return the outliers of the fields in which they were searched so far."""
+        return {}
+
     def gross_outliers(self, field: DisplacementField) -> GrossOutliers:
         """Return the gross outliers of a field; none where it has too few points for a surface."""
+        if field not in self._outliers_by_field:
+            self._outliers_by_field[field] = self._search_outliers(field)
+        return self._outliers_by_field[field]
+
+    def _search_outliers(self, field: DisplacementField) -> GrossOutliers:
+        """Fit a smooth surface to all points of a field but those far off it."""
         inner_rows = np.flatnonzero(self.inner(field, OUTLIERS.disk_share))
         is_outlying = np.zeros(len(field.points), dtype=bool)
         rows = thinned(inner_rows, OUTLIERS.max_points)

@@ -394,7 +394,7 @@ class PreparedBubble(PreparedInflation):
         _, points_beyond = at_points(self.test, self.fields_to_match, mesh)
         return points_beyond
 
-    @property
+    @cached_property
     def view(self) -> MeasuredView:
         """Return the measured fields, up to the first fall of the pressure, for checks of them."""
         test = self.test
@@ -434,7 +434,7 @@ class PreparedBubble(PreparedInflation):
         return lines if has_scale else (*lines, NO_SCALE)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        return () if self.known is not None else doubts_of(replace(self.view, expected=expected))
+        return () if self.known is not None else doubts_of(self.view.expecting(expected))
 
 
 def masked_targets(
@@ -506,7 +506,8 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     )
     with test.place.errors_name():
         sheet = measured_sheet(test.sheet, test.outline, prepared.fields_to_match)
-    return replace(prepared, sheet=sheet)
+    object.__setattr__(prepared, "sheet", sheet)  # which keeps the outlying points that are known
+    return prepared
 
 
 def _computed(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...light_dataclasses import dataclass
+from ..cubic_curves import spline_slopes
 from . import base
 from .base import (
     COMPONENTS,
@@ -133,13 +134,23 @@ def _coefficients(knots: Sequence[float]) -> Array:
 
     Coefficients are those of powers of strain, the highest first.
     """
-    spline = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
-    coefficients = np.zeros((len(knots) - 1, 4, len(knots)))
+    n = len(knots)
+    steps = np.diff(knots)[:, None]
+    slopes = spline_slopes(np.asarray(knots, dtype=float))
+    secants = np.diff(np.eye(n), axis=0) / steps
+    # Of powers of x - start, from the lowest on.
+    by_power = (
+        np.eye(n)[:-1],
+        slopes[:-1],
+        (3.0 * secants - 2.0 * slopes[:-1] - slopes[1:]) / steps,
+        (slopes[:-1] + slopes[1:] - 2.0 * secants) / steps**2,
+    )
+    coefficients = np.zeros((n - 1, 4, n))
     for k, start in enumerate(knots[:-1]):
         for power in range(4):  # c (x - start)^power
             for lower in range(power + 1):
                 share = comb(power, lower) * (-start) ** (power - lower)
-                coefficients[k, 3 - lower] += share * spline.c[3 - power, k]
+                coefficients[k, 3 - lower] += share * by_power[power][k]
     return coefficients
 
 
