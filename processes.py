@@ -153,6 +153,21 @@ def copies_for(do: Callable[[int, M], V], seconds: Sequence[float]) -> Copies[M,
     return scope.copies
 
 
+def run_side_by_side(do: Callable[[int], V], count: int) -> list[V]:
+    """Return the results of `count` tasks by their numbers, done by copies where these may be made.
+
+    The tasks count as equally long.
+    """
+
+    def do_number(number: int, _: None) -> V:
+        return do(number)
+
+    copies = copies_for(do_number, [1.0] * count)
+    if copies is None:
+        return [do(number) for number in range(count)]
+    return copies.run([None] * count)
+
+
 def _shares(seconds: Sequence[float], processes: int, *, least: float = 0.01) -> list[list[int]]:
     """Share tasks out among processes, of which each has `least` seconds to do, or one has all."""
     shares: list[list[int]] = [[] for _ in range(processes)]

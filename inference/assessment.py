@@ -18,6 +18,7 @@ from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw, ThicknessChange
 from ..meshes.bubble_model import BubbleModel
 from ..notes import Note
+from ..processes import run_side_by_side
 from .discrepancy import (
     SMOOTH_DEGREE,
     Cause,
@@ -355,21 +356,29 @@ def discrepancies(
     modulus_change : callable
         See `discrepancy.ModulusChange`.
     """
-    discrepancy_of = {}
-    for k, comparison in enumerate(problem.comparisons):
-        fitted = _FittedComparison(problem, k, residual, best, modulus_change)
+
+    def discrepancy_of(number: int) -> Discrepancy | None:
+        fitted = _FittedComparison(problem, number, residual, best, modulus_change)
         if fitted.objective.specimens is not None:
             discrepancy = fitted.specimen_discrepancy()
         else:
             discrepancy = fitted.sheet_discrepancy(mesh_doubt)
-        if discrepancy is None:
-            continue
         measured = fitted.objective.measured
-        if measured.any():
-            relative_rms = discrepancy.rms / float(np.sqrt(np.mean(measured**2)))
-            discrepancy = replace(discrepancy, relative_rms=relative_rms)
-        discrepancy_of[comparison.name] = discrepancy
-    return discrepancy_of
+        if discrepancy is None or not measured.any():
+            return discrepancy
+        relative_rms = discrepancy.rms / float(np.sqrt(np.mean(measured**2)))
+        return replace(discrepancy, relative_rms=relative_rms)
+
+    comparisons = problem.comparisons
+    if all(comparison.may_run_aside for comparison in comparisons):
+        by_number = run_side_by_side(discrepancy_of, len(comparisons))
+    else:
+        by_number = list(map(discrepancy_of, range(len(comparisons))))
+    return {
+        comparison.name: discrepancy
+        for comparison, discrepancy in zip(comparisons, by_number, strict=True)
+        if discrepancy is not None
+    }
 
 
 @dataclass(eq=False)

@@ -129,10 +129,13 @@ class _Team:
         comparisons: Sequence[Comparison],
         run: Callable[[int, _Analysis], _Run | SolverFailure],
     ) -> _Team | None:
-        """Return copies for comparisons that have run once; None where they are not allowed."""
-        if not all(comparison.seconds and comparison.may_run_aside for comparison in comparisons):
+        """Return copies for comparisons; None where they are not allowed."""
+        if not all(comparison.may_run_aside for comparison in comparisons):
             return None
-        copies = copies_for(run, [comparison.seconds for comparison in comparisons])
+        seconds = [comparison.seconds for comparison in comparisons]
+        if not all(seconds):  # as long as they have not run, all count alike
+            seconds = [1.0] * len(comparisons)
+        copies = copies_for(run, seconds)
         return None if copies is None else cls(comparisons, copies)
 
     def run(self, analysis: _Analysis) -> list[_Run | SolverFailure]:
@@ -426,10 +429,7 @@ class FitProblem:
         return evaluation
 
     def _results(self, y: Array, with_jacobian: bool, warm: bool) -> Iterable[_Run | SolverFailure]:
-        """Return the runs of the comparisons, side by side from the second analysis on.
-
-        The first tells how long each takes, and finds what later ones share: patterns of matrices.
-        """
+        """Return the runs of the comparisons, side by side where they may be."""
         analysis = _Analysis(y, with_jacobian, warm)
         if self._team is None or not self._team.copies.exist:
             self._team = _Team.of(self.comparisons, self._run_of)
