@@ -258,13 +258,20 @@ def _first_from_later_guess(
 ) -> Array | None:
     """Return the equilibrium at the first level by unloading from a later one, or None.
 
-    That is the first later level whose guess leads to an equilibrium.
+    That is the first later level whose guess leads to an equilibrium. On the way down each start is
+    its guess with what the guess lacks at the level above.
     """
-    for level, start in list(zip(levels, guess, strict=False))[1:]:
-        higher = loading.equilibrium(loading.admissible(start), level)
-        if higher is not None:
-            unloaded = loading.start_within_step(higher, level, levels[0], None)
-            return loading.reach(level, higher, levels[0], unloaded, loading.max_halvings)
+    starts = [loading.admissible(start) for start in guess[: len(levels)]]
+    for k in range(1, len(starts)):
+        u = loading.equilibrium(starts[k], levels[k])
+        if u is None:
+            continue
+        for i in reversed(range(k)):
+            start = starts[i] + u - starts[i + 1]
+            u = loading.reach(levels[i + 1], u, levels[i], start, loading.max_halvings)
+            if u is None:
+                break
+        return u
     return None
 
 

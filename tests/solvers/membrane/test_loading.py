@@ -1,4 +1,4 @@
-"""solvers/membrane/loading.py: rims that move, slack and raised sheets."""
+"""solvers/membrane/loading.py: rims that move, slack and raised sheets, starts from guesses."""
 
 from dataclasses import replace
 
@@ -98,3 +98,22 @@ def test_extrapolation_is_exact_for_polynomials():
     path = [np.full((1, 3), 2.0), np.full((1, 3), 3.0)]
     np.testing.assert_allclose(loading.straight_on([1.0, 3.0], path, 4.0), 3.5)
     assert loading.straight_on([1.0], path[:1], 4.0) is path[0]
+
+
+def test_first_level_is_reached_from_a_later_guess_with_what_guesses_lack_in_common():
+    """All guesses lack 0.3, and only at the last level such a start leads to the equilibrium."""
+    exact = {1.0: 1.0, 2.0: 4.0, 3.0: 9.0}
+    tried = []
+
+    class Near(loading.Loading):
+        def equilibrium(self, start, level):
+            tried.append(level)
+            reach = 1.0 if level == 3.0 else 0.1
+            solution = np.full((1, 3), exact[level])
+            return solution if np.abs(start - solution).max() < reach else None
+
+    guess = np.array(list(exact.values()))[:, None, None] - 0.3 * np.ones((3, 1, 3))
+    request = loading.RunRequest(guess=guess)
+    u = loading.equilibrium_at(Near(), list(exact), 0, -1, request, ([], []))
+    assert u.tolist() == [[1.0] * 3]
+    assert tried == [1.0, 2.0, 3.0, 2.0, 1.0]
