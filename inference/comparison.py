@@ -28,22 +28,26 @@ MAX_WARM_CHANGE = 0.02
 class WarmStart:
     """The last run with derivatives, from which runs at nearby parameters may start.
 
+    Before the first one it is the last run without, from which a run at the same may start.
+
     Attributes
     ----------
     parameters : (p,) array
         Values of the run.
     path : array
         Solution of every increment, as in `History.path`.
-    slope : array
+    slope : array or None
         Derivative of the path by the parameters.
     """
 
     parameters: Array
     path: Array
-    slope: Array
+    slope: Array | None
 
     def guess(self, parameters: Array) -> Array | None:
         """Return the path predicted for other parameters (p,); None where it changes too much."""
+        if self.slope is None:
+            return self.path if np.array_equal(parameters, self.parameters) else None
         change = self.slope @ (parameters - self.parameters)
         if np.abs(change).max() > MAX_WARM_CHANGE * np.abs(self.path).max():
             return None
@@ -262,10 +266,14 @@ class Comparison:
         model = self.model_at(nuisance)
         if not isinstance(self.solver, DifferentiatingSolver):
             return self.solver.run(model, law)
-        guess = self._guess(self._parameters(law, free, values)) if warm else None
+        parameters = self._parameters(law, free, values)
+        guess = self._guess(parameters) if warm else None
         if coarse_run is not None and coarse_run.path is not None and self.prolong is not None:
             guess = self.prolong(coarse_run.path)
-        return self.solver.run(model, law, guess=guess)
+        history = self.solver.run(model, law, guess=guess)
+        if history.path is not None and (self.warm_start is None or self.warm_start.slope is None):
+            self.warm_start = WarmStart(parameters, history.path, None)
+        return history
 
     def differentiate(
         self,

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...materials.cubic_curves import hermite_slope_weights, hermite_weights, spline_slopes
+from ...materials.cubic_curves import hermite_weights, spline_slopes
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
@@ -146,10 +146,9 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
         rates.append(pull.rate.reshape(shape))
         if derivatives is not None:
             rate = derivatives.at_fixed_displacement(u)
-            _, slope = pull.elongation(u)
             du = np.zeros_like(rate)
             du[free] = -tangent.solve(rate[free])
-            du -= np.outer(pull.rate, slope @ du)
+            du -= np.outer(pull.rate, pull.opening(u, du))
             load_slopes.append(direction @ (rate + tangent.edge() @ du))
             derivatives.advance(du)
             path_slopes.append(du.reshape(*shape, -1))
@@ -207,6 +206,7 @@ class Pulling(Loading):
     def __post_init__(self) -> None:
         lower, upper = self.membrane.reference[self.gauge]
         self.gauge_length = float(np.linalg.norm(upper - lower))
+        self.driven = np.flatnonzero(self.direction)
         self.rate = np.zeros_like(self.direction)
         self.force_rates = list[float]()
 
@@ -223,7 +223,7 @@ class Pulling(Loading):
             u = equilibrium_at(self, levels, i, increments.previous, request, (passed, path))
             self.membrane.factor()
             w = self.response()
-            self.rate = w / (self.elongation(u)[1] @ w)
+            self.rate = w / self.opening(u, w)
             force = float(self.membrane.residual @ self.direction)
             force_rate = float(self.direction @ (self.tangent.edge() @ self.rate))
             if increments.accept(force, force_rate, self.tangent.definite()):
@@ -233,17 +233,16 @@ class Pulling(Loading):
                 self.force_rates.append(force_rate)
                 request.report(i + 1)
 
-    def elongation(self, u: Array) -> tuple[float, Array]:
-        """Return the elongation of the gauge (mm) at the displacement u (n, 3) mm.
+    def elongation(self, u: Array) -> float:
+        """Return the elongation of the gauge (mm) at the displacement u (n, 3) mm."""
+        return math.dist(*(self.membrane.reference[self.gauge] + u[self.gauge])) - self.gauge_length
 
-        Its derivative (3 n,) by the displacements follows.
-        """
+    def opening(self, u: Array, moves: Array) -> Array:
+        """Return the derivatives (...) of the gauge's elongation along displacements (3 n, ...)."""
         lower, upper = self.membrane.reference[self.gauge] + u[self.gauge]
-        length = float(np.linalg.norm(upper - lower))
-        slope = np.zeros(u.shape)
-        slope[self.gauge[1]] = (upper - lower) / length
-        slope[self.gauge[0]] = -slope[self.gauge[1]]
-        return length - self.gauge_length, slope.reshape(-1)
+        lower_moves, upper_moves = moves.reshape(*u.shape, *moves.shape[1:])[self.gauge]
+        axis = (upper - lower) / math.dist(lower, upper)
+        return np.asarray(axis @ (upper_moves - lower_moves))
 
     def response(self) -> Array:
         """Return the displacement (3 n,) for one mm of pull, by the tangent as last factorised."""
@@ -284,7 +283,7 @@ class Pulling(Loading):
         last = np.inf
         for _ in range(self.settings.max_corrections):
             norm = m.unbalance(u, 0.0, with_tangent=True)
-            elongation, slope = self.elongation(u)
+            elongation = self.elongation(u)
             if (
                 norm < m.tolerance
                 and abs(level - elongation) <= self.settings.tolerance * self.gauge_length
@@ -300,7 +299,7 @@ class Pulling(Loading):
             loads = np.column_stack([m.residual, self.tangent.edge() @ self.direction])
             moves = np.column_stack([np.zeros_like(self.direction), self.direction])
             moves[free] = -self.tangent.solve(loads[free])
-            gained, opens = slope @ moves
+            gained, opens = self.opening(u, moves)
             if not opens > 0:
                 return None
             step = moves @ np.array([1.0, (level - elongation - gained) / opens])
@@ -325,13 +324,12 @@ class Pulling(Loading):
             displacement = m.equilibrium(u, 0.0)
             if displacement is None:
                 return None
-            elongation, slope = self.elongation(displacement)
-            gap = level - elongation
+            gap = level - self.elongation(displacement)
             if abs(gap) <= self.settings.tolerance * self.gauge_length:
                 return displacement
             m.factor()
             w = self.response()
-            opens = float(slope @ w)
+            opens = float(self.opening(displacement, w))
             move = gap / opens if opens > 0 else np.inf
             if abs(move) * np.abs(w).max() > m.step_limit:
                 return None
@@ -364,12 +362,10 @@ class Pulling(Loading):
 
     def admissible(self, guess: Array) -> Array:
         """Return a guess (n, 3) with held unknowns at zero and driven ones at their mean value."""
-        flat = np.array(guess, dtype=float).reshape(-1)
-        driven = self.direction != 0
-        free = self.membrane.free
+        flat = np.asarray(guess, dtype=float).reshape(-1)
         displacement = np.zeros_like(flat)
-        displacement[free] = flat[free]
-        displacement[driven] = float(flat[driven].mean())
+        displacement[self.membrane.free] = flat[self.membrane.free]
+        displacement[self.driven] = float(flat[self.driven].mean())
         return displacement.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
@@ -481,16 +477,18 @@ class SolvedIncrements:
         if len(self.solved) < 2 or self.longest_step == 1:
             return 0.0, 0.0
         settings = self.settings
-        knots = self.levels[self.solved[-2:]]
-        position = self.levels[[i]]
-        by_value, by_slope = hermite_weights(knots, position)
-        cubic = by_value @ self._responses[-2:] + by_slope @ self._slopes[-2:]
-        by_value, by_slope = hermite_slope_weights(knots, position)
-        cubic_slope = by_value @ self._responses[-2:] + by_slope @ self._slopes[-2:]
-        deviation = abs(response - float(cubic[0]))
-        slope_deviation = abs(slope - float(cubic_slope[0]))
-        last_step = float(knots[1] - knots[0])
-        step = float(position[0] - knots[1])
+        begin, end = self.levels[self.solved[-2:]].tolist()
+        values, slopes = self._responses[-2:], self._slopes[-2:]
+        last_step = end - begin
+        step = float(self.levels[i]) - end
+        # The cubic of the last step goes on by powers of the distance from its end.
+        secant = (values[1] - values[0]) / last_step
+        second = (slopes[0] + 2.0 * slopes[1] - 3.0 * secant) / last_step
+        third = (slopes[0] + slopes[1] - 2.0 * secant) / last_step**2
+        cubic = values[1] + step * (slopes[1] + step * (second + step * third))
+        cubic_slope = slopes[1] + step * (2.0 * second + step * 3.0 * third)
+        deviation = abs(response - cubic)
+        slope_deviation = abs(slope - cubic_slope)
         both = last_step + step
         # A cubic through values and slopes at a and b deviates at x by a 24th of the fourth
         # derivative times (x - a)^2 (x - b)^2.
@@ -501,7 +499,7 @@ class SolvedIncrements:
         error = settings.cubic_bound * step * slope_deviation
         if fourth_derivative < settings.max_growth * self._fourth_derivative:
             error = min(error, settings.safety * fourth_derivative * step**4 / 384)
-        largest = float(np.abs([*self._responses, response]).max())
+        largest = max(map(abs, [*self._responses, response]))
         return fourth_derivative, error / (self.allowed_error * largest)
 
     def read(self, values: Array, slopes: Array | None = None) -> Array:
@@ -515,15 +513,19 @@ class SolvedIncrements:
         """
         if len(values) == len(self.levels):
             return values
-        by_value, by_slope = self._weights
         if slopes is None:
-            by_value = by_value + by_slope @ spline_slopes(self.levels[self.solved])
-        reading = np.tensordot(by_value, values, 1)
-        if slopes is not None:
-            reading += np.tensordot(by_slope, slopes, 1)
+            reading = np.tensordot(self._spline_weights, values, 1)
+        else:
+            by_value, by_slope = self._weights
+            reading = np.tensordot(by_value, values, 1) + np.tensordot(by_slope, slopes, 1)
         reading[self.solved] = values
         return reading
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
         return hermite_weights(self.levels[self.solved], self.levels)
+
+    @cached_property
+    def _spline_weights(self) -> Array:
+        by_value, by_slope = self._weights
+        return by_value + by_slope @ spline_slopes(self.levels[self.solved])
