@@ -48,7 +48,7 @@ class WarmStart:
         """Return the path predicted for other parameters (p,); None where it changes too much."""
         if self.slope is None:
             return self.path if np.array_equal(parameters, self.parameters) else None
-        change = self.slope @ (parameters - self.parameters)
+        change = np.tensordot(self.slope, parameters - self.parameters, 1)
         if np.abs(change).max() > MAX_WARM_CHANGE * np.abs(self.path).max():
             return None
         return self.path + change

@@ -181,7 +181,7 @@ def differences(knots, places, measured, count, slopes, model):
     """Return what specimens (their numbers in `count`) read alike beside a model's load."""
     objective = StripObjective(knots, places, measured, specimens=count)
     problem = SimpleNamespace(
-        comparisons=[SimpleNamespace(name="warp", objective=objective)],
+        comparisons=[SimpleNamespace(name="warp", objective=objective, may_run_aside=True)],
         rows=lambda _: slice(None), scale=objective.scale,
     )  # fmt: skip
     best = SimpleNamespace(jacobian=slopes / objective.scale[:, None], histories=[model])
