@@ -122,10 +122,19 @@ def test_interrupted_bootstrap_is_resumed(project, drawn_again, tmp_path, monkey
     given = {"card": CARD, "tests": "one", "out": tmp_path / "out"}
     raised(KeyboardInterrupt, "", bootstrap, project, "specimens", 4, **given)
     raised(OutputError, "already holds results", bootstrap, project, "specimens", 4, **given)
-    done = bootstrap(project, "specimens", 4, **given, resume=True)
-    assert fitted == [0, 1, 2, 3]
+    counted = []
+
+    def count(*event):
+        if len(event) == 3:
+            counted.append(event[:2])
+
+    done = bootstrap(project, "specimens", 4, **given, resume=True, progress=count)
+    assert fitted == [0, 1, 2, 3] and counted == [(2, 4), (3, 4), (4, 4)]
     assert [s.counts for s in done.samples] == [s.counts for s in drawn_again.samples[:4]]
     np.testing.assert_allclose(done.unknowns, drawn_again.unknowns[:4], rtol=1e-6)
+    # Samples of an earlier run with more of them do not count.
+    bootstrap(project, "specimens", 2, **given, resume=True, progress=count)
+    assert counted[3:] == [(2, 2)] and fitted == [0, 1, 2, 3]
     bootstrap(project, "specimens", 2, **given, resume=True, seed=8)
     assert fitted == [0, 1, 2, 3, 0, 1]
 
