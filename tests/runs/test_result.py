@@ -34,6 +34,13 @@ def test_table_of_moduli_has_values_and_bands_up_to_valid_strain(fitted):
     assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
 
 
+def test_bands_reach_from_rest_to_the_valid_strain(fitted):
+    end = float(fitted.best.valid[0])
+    bands = fitted.bands([-1e-6, 0.0, end, 1.001 * end]).query("modulus == 'E1'")
+    is_known = bands[["lower_MPa", "upper_MPa"]].notna().to_numpy()
+    assert is_known.tolist() == [[False] * 2, [True] * 2, [True] * 2, [False] * 2]
+
+
 def test_residuals_are_modelled_minus_measured(fitted):
     residuals = fitted.residuals()
     assert set(residuals["quantity"]) == {"dx", "dy", "dz"}
