@@ -11,6 +11,7 @@ from bubblefit.materials.card import write_card
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports.presenter import page_presenter_of
 from bubblefit.runs.result import COMPARED
+from bubblefit.runs.verdict import answers
 
 from ..support.commands import in_process, result_in
 from ..support.paths import ROOT
@@ -32,6 +33,13 @@ def test_table_of_moduli_has_values_and_bands_up_to_valid_strain(fitted):
     e1 = moduli[moduli["modulus"] == "E1"]
     assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
     assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
+
+
+def test_table_of_a_notebook_has_strains_in_percent(fitted):
+    page = fitted._repr_html_()
+    for answer in answers(fitted.best, fitted.thickness):
+        cells = (f"{100 * answer.strain:.3g} %", f"{answer.value:.4g}", f"{answer.per_width:.4g}")
+        assert all(f">{cell}<" in page for cell in cells), answer
 
 
 def test_bands_reach_from_rest_to_the_valid_strain(fitted):
