@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.estimate import estimate_of
-from common import BENDING, EXAMPLES, ROOT, known_project, known_setup, start_on
+from common import BENDING, EXAMPLES, ROOT, SHARED, known_project, known_setup, start_on
 
 #: mm, of one displacement.
 NOISE = 0.0, 0.01, 0.03, 0.1
@@ -78,8 +78,8 @@ def beside(other="../old", repeats=3, *, data=bench_valmex.DATA, long=False):
 
     OTHER/bubblefit is a worktree of it (git worktree add). Prints seconds of processor time with
     all processes and imports, without compiling, the least of REPEATS side by side, their ratio,
-    and objectives. A version without estimates starts at random. --long: 50 starts, and one law of
-    tests 1 to 3 and strips.
+    and objectives. A version without estimates starts at random. --long: 50 starts, one law of
+    tests 1 to 3 and strips, and one of strips in five directions.
     """
     known = EXAMPLES / "bubble-known-solution" / "project.toml"
     with tempfile.TemporaryDirectory() as place:
@@ -93,7 +93,8 @@ def beside(other="../old", repeats=3, *, data=bench_valmex.DATA, long=False):
                  ("known solution, one start from the estimate", known, 1, "estimate")]  # fmt: skip
         if long:
             works += [("known solution, 50 random starts", known, 50, ""),
-                      ("tests 1 to 3 and strips, one start", all_three, 1, "estimate")]  # fmt: skip
+                      ("tests 1 to 3 and strips, one start", all_three, 1, "estimate"),
+                      ("strips at five angles, one start", five_angles(place), 1, "")]  # fmt: skip
         for name, project, starts, begin in works:
             versions = str(Path(other).absolute()), str(ROOT.parent)
             seconds = {version: [] for version in versions}
@@ -184,6 +185,42 @@ def run_apart(version, folder, code, *arguments):
         text=True,
     )
     return done.stdout
+
+
+#: Strips of the example strips-nylon as any version reads them.
+NYLON = """
+[[strips]]
+name = "{name}"
+width = 27.0
+grip_distance = 101.0
+match = "points"
+bias_angle = {angle:.1f}
+{gauges}
+data = {{ files = {{ {files} }} }}
+"""
+
+
+def five_angles(place):
+    """Write a project of strips at 0, 30, 45, 60 and 90 degrees into PLACE; return its path."""
+    table = pd.read_csv(SHARED / "strips_directions" / "strips.csv")
+    for angle, rows in table.groupby("direction_deg"):
+        rows.drop(columns="direction_deg").to_csv(Path(place) / f"{angle}.csv", index=False)
+    law = """
+[law]
+form = "quadratic"
+bounds = { E1 = [0.02, 1.0], E2 = [0.02, 1.0], G12 = [0.001, 0.2] }
+"""
+    text = 'fabric = { name = "nylon", thickness = 0.17 }\nfit = { starts = 1, seed = 1 }\n' + law
+    three = {"warp": 0, "fill": 90, "bias": 45}
+    for name, angles in (("3", three), ("30", {"bias": 30}), ("60", {"bias": 60})):
+        files = ", ".join(f'{cut} = ["{angle}.csv"]' for cut, angle in angles.items())
+        gauges = "\n".join(
+            f"{cut} = {{ gauge_length = 97.0, final_length = 100.7 }}" for cut in angles
+        )
+        text += NYLON.format(name=name, angle=angles["bias"], files=files, gauges=gauges)
+    path = Path(place) / "five.toml"
+    path.write_text(text)
+    return path
 
 
 def real_project(data, law, *tests):
