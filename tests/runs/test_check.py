@@ -2,10 +2,13 @@
 
 from types import SimpleNamespace
 
+import bubblefit as bf
 import numpy as np
 from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.check import expected_of
+from bubblefit.runs.check import NOTHING, expected_of
+
+from ..builders.projects import constant_strips
 
 LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
 
@@ -28,3 +31,12 @@ def test_expected_moduli_follow_from_bounds():
         np.testing.assert_allclose(soft[name], (LEAST[name], 0.5 * value))
     none = expected(LawBounds(LEAST, None, -upper, -lower))
     assert none == {name: (least, least) for name, least in LEAST.items()}
+
+
+def test_each_test_has_a_row_in_what_a_check_shows(tmp_path):
+    check = bf.check(bf.read_project(constant_strips(tmp_path)))
+    findings = check.findings
+    assert set(findings) == {"one", "two"}
+    shown = {name: [row[1:] for row in check.rows() if row[0] == name] for name in findings}
+    for name, rows in findings.items():
+        assert set(rows or [("fine", "", NOTHING)]) <= set(shown[name])
