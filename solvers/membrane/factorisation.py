@@ -442,7 +442,9 @@ class SparseTangent(StoredTangent):
         self.near = self.exact = solve
 
     def renew(self) -> None:
-        self.near = self.fronts.factorised(self._symmetric_part())
+        symmetric = self._symmetric_part()
+        # Of the finest meshes, factors in single precision may fail.
+        self.near = self.fronts.factorised(symmetric) or self.fronts.factorised(symmetric, float)
         if self.near is None:
             self.factor()
 
@@ -456,12 +458,9 @@ class SparseTangent(StoredTangent):
             self.near = factors
             if (factors.pivots() / self.matrix.diagonal()).min() > self.clear_pivot:
                 return True
-        try:
-            lu = self._exact_factors(symmetric)
-        except SingularTangent:
-            return False
-        # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
-        return np.array_equal(lu.perm_r, lu.perm_c) and bool(lu.U.diagonal().min() > 0)
+        exact_factors = self.fronts.factorised(symmetric, float)
+        self.near = factors or exact_factors or self.near
+        return exact_factors is not None
 
     def _symmetric_part(self) -> Array:
         """Return the entries (nonzeros,) of the symmetric part of the tangent."""

@@ -8,6 +8,7 @@ together, in a dense front, by LAPACK (Duff and Reid, ACM Trans. Math. Softw. 9 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -17,7 +18,7 @@ from ...compilation import compiled
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
-Singles = NDArray[np.float32]
+Floats = NDArray[Any]
 #: Count of quads up to which a part is not halved: smaller parts cost calls, larger ones numbers.
 LARGEST_PART = 32
 
@@ -122,34 +123,38 @@ class Fronts:
         on_border = np.searchsorted(self._keys, keys) - self.borders[f] + width
         return np.where(i < self.starts[f + 1], i - self.starts[f], on_border)
 
-    def factorised(self, data: Array) -> NestedFactors | None:
+    def factorised(self, data: Array, number: type = np.float32) -> NestedFactors | None:
         """Return the factors of a symmetric matrix; None if it is not positive definite.
 
         Parameters
         ----------
         data : array
             Its entries, in the order of `rows` and `columns`.
+        number : type
+            Type of the factors' numbers.
         """
-        numbers = np.zeros(self.panels[-1], dtype=np.float32)
+        potrf, trtri = scipy.linalg.get_lapack_funcs(("potrf", "trtri"), dtype=number)
+        syrk = scipy.linalg.get_blas_funcs("syrk", dtype=number)
+        numbers: Floats = np.zeros(self.panels[-1], dtype=number)
         numbers[self.places] = data[self.lower]
-        remainders: list[Singles] = []
+        remainders: list[Floats] = []
         for f, updates in enumerate(self.updates):
             height = int(self.heights[f])
             panel = numbers[self.panels[f] : self.panels[f + 1]].reshape(height, -1, order="F")
             width = panel.shape[1]
-            remainder = np.zeros((height - width,) * 2, dtype=np.float32, order="F")
+            remainder: Floats = np.zeros((height - width,) * 2, dtype=number, order="F")
             for half, local_rows in updates:
                 _add_remainder(panel, remainder, remainders[half], local_rows)
                 remainders[half] = remainder[:0]
             if width:
-                factor, info = scipy.linalg.lapack.spotrf(panel[:width], lower=1)
+                factor, info = potrf(panel[:width], lower=1)
                 if info:
                     return None
-                inverse, _ = scipy.linalg.lapack.strtri(factor, lower=1)
+                inverse, _ = trtri(factor, lower=1)
                 panel[:width] = inverse
             if 0 < width < height:
                 lower_rows = panel[width:] @ inverse.T
-                remainder = scipy.linalg.blas.ssyrk(
+                remainder = syrk(
                     -1.0,
                     lower_rows,
                     1.0,
@@ -177,10 +182,10 @@ def _unknowns(nodes: Numbers, place: Numbers) -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class NestedFactors:
-    """Inverse of a symmetric matrix by Cholesky's factors in single precision."""
+    """Inverse of a symmetric matrix by Cholesky's factors."""
 
     fronts: Fronts
-    numbers: Singles
+    numbers: Floats
 
     def pivots(self) -> Array:
         """Return the pivots (free,) of the elimination, by unknown."""
@@ -193,7 +198,7 @@ class NestedFactors:
 
     def __call__(self, rhs: Array) -> Array:
         fronts = self.fronts
-        ordered = rhs[fronts.order].astype(np.float32)
+        ordered = rhs[fronts.order].astype(self.numbers.dtype)
         _solve(
             self.numbers,
             fronts.panels,
@@ -201,7 +206,7 @@ class NestedFactors:
             fronts.border,
             fronts.borders,
             ordered,
-            np.empty(int(fronts.heights.max()), dtype=np.float32),
+            np.empty(int(fronts.heights.max()), dtype=self.numbers.dtype),
         )
         x = np.empty(len(rhs))
         x[fronts.order] = ordered

@@ -110,17 +110,20 @@ def test_doubtful_pivots_are_looked_at_in_double_precision(
     monkeypatch.setattr(factorisation, "LARGEST_BAND", 0)
     points, quads = distorted_grid(1, 1, 1.0, 1.0)
     tangent = tangent_for(quads, points, np.arange(points.size))
-    exact_factors, calls = tangent._exact_factors, []
-    monkeypatch.setattr(
-        tangent, "_exact_factors", lambda data: calls.append(data) or exact_factors(data)
-    )
+    factorised, types = tangent.fronts.factorised, []
+
+    def counted(data, number=np.float32):
+        types.append(number)
+        return factorised(data, number)
+
+    monkeypatch.setattr(tangent.fronts, "factorised", counted)
     # Two equal and nearly dependent rows; x + a skew part, which does not count.
     matrix = np.eye(12)
     matrix[:2, :2] = [[1.0, 1.0], [1.0, 1.0 + least]]
     matrix[2, 3], matrix[3, 2] = 5.0, -5.0
     tangent.data[tangent.slot.ravel()] = matrix.ravel()
     assert tangent.definite() == is_definite
-    assert len(calls) == exact_count
+    assert types == [np.float32] + exact_count * [float]
 
 
 def bordered_band(random, asymmetry):
