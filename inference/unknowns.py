@@ -342,7 +342,8 @@ class Unknowns:
             quantity, _, strain = name.partition("_")
             if quantity == "reloading":
                 pairs.append((law_parameters.index(f"unloading_{strain}"), reloading))
-        rows = np.vstack([np.eye(count), -np.eye(count), np.zeros((len(pairs), count))])
+        within_bounds = [np.eye(count), -np.eye(count)]
+        rows = np.vstack([*within_bounds, np.zeros((len(pairs), count))])
         for row, (unloading, reloading) in enumerate(pairs, start=2 * count):
             rows[row, [unloading, reloading]] = 1.0, -1.0
         lower, upper = self.nuisance.bounds

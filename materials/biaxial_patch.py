@@ -250,7 +250,9 @@ def _is_stable(k, h):  # type: ignore[no-untyped-def]
     """Return whether every further strain takes work; k (2, 2) at the strain h."""
     a = k[0, 0] * math.exp(-h[0])
     b = k[1, 1] * math.exp(-h[1])
-    across = 0.5 * (k[0, 1] * math.exp(-h[1]) + k[1, 0] * math.exp(-h[0]))
+    fill_of_warp = k[0, 1] * math.exp(-h[1])
+    warp_of_fill = k[1, 0] * math.exp(-h[0])
+    across = 0.5 * (fill_of_warp + warp_of_fill)
     return a > 0.0 and a * b > across * across
 
 

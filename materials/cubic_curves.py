@@ -57,7 +57,9 @@ def spline_slopes(knots: Array) -> Array:
         left, right = steps[i - 1 : i + 1]
         matrix[i, i - 1 : i + 2] = right, 2.0 * (left + right), left
         sides[i] = 3.0 * (right * secants[i - 1] + left * secants[i])
-    for i, inner, outer, further in ((0, 1, 0, 1), (count - 1, count - 2, -1, -2)):
+    first_end = (0, 1, 0, 1)
+    last_end = (count - 1, count - 2, -1, -2)
+    for i, inner, outer, further in (first_end, last_end):
         if count == 3:
             matrix[i, [i, inner]] = 1.0
             sides[i] = 2.0 * secants[outer]

@@ -57,7 +57,9 @@ class DesignersConstants:
             raise InputError(None, "constants", problem)
         warp = 1 / c[0, 0]
         fill = 1 / c[1, 1]
-        return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp))
+        nu_warp = -c[0, 1] * fill
+        nu_fill = -c[1, 0] * warp
+        return cls(float(warp), float(fill), float(nu_warp), float(nu_fill))
 
     @classmethod
     def of_stiffness(cls, stiffness: ArrayLike) -> Self:
@@ -67,7 +69,8 @@ class DesignersConstants:
         if not det > 0:
             problem = "the direct form has no inverse: these paths have no constants"
             raise InputError(None, "constants", problem)
-        inverse = np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / det
+        adjugate = [[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]
+        inverse = np.array(adjugate) / det
         return cls.of_compliance(inverse)
 
     @property

@@ -186,7 +186,12 @@ def grid_quads(nodes: Numbers) -> Numbers:
     nodes : (a, b) array
         Numbers of its nodes.
     """
-    corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
+    corners = [
+        nodes[:-1, :-1],
+        nodes[1:, :-1],
+        nodes[1:, 1:],
+        nodes[:-1, 1:],
+    ]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 

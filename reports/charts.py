@@ -447,7 +447,8 @@ def moduli_charts(
             words = f"best: at most {deviation[0, m].max():.2g} %"
             # Dips where curves cross say nothing: seven decades are drawn.
             best, *curves = np.maximum(deviation[:, m], deviation[:, m].max() / 1e7)
-            series = [line("best", x[m], best), *(line(x=x[m], y=y, **next_fits) for y in curves)]
+            series = [line("best", x[m], best)]
+            series += [line(x=x[m], y=curve, **next_fits) for curve in curves]
             axis = "deviation from known, %"
             heading = f"{title.partition(',')[0]}, {words}"
             charts.append(Chart(heading, label, axis, series, words, log_y=True))

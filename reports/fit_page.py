@@ -224,7 +224,10 @@ def warnings_of(fit: Fit) -> Words:
 
 def misfit_table(fit: Fit) -> Table:
     """Return a table of the RMS residual of every comparison beside the noise of its data."""
-    rows = [[name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()]
+    rows = [
+        [name, misfit.rms, misfit.noise, misfit.unit, misfit.noise_is, misfit.ratio]
+        for name, misfit in fit.misfits.items()
+    ]
     header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
     note = (
         "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "

@@ -230,7 +230,8 @@ def strip_charts(
     """
     initial = points[:, :2]
     deformed = initial + displacement[:, :2]
-    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    following = np.roll(cells, -1, axis=1)
+    edges = np.stack([cells, following], axis=-1).reshape(-1, 2)
     unique, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     outline = unique[count == 1]  # an edge within the strip belongs to two quads
     series = [

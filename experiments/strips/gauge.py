@@ -110,7 +110,11 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     # triangulating. `areas` are twice the areas of the triangles that the point makes with the
     # side opposite to each corner: over their sum they are its barycentric coordinates.
     x, y = np.moveaxis(surface.positions[simplices, 0, :2] - end, -1, 0)
-    areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
+    x_next = np.roll(x, -1, axis=1)
+    y_next = np.roll(y, -1, axis=1)
+    x_last = np.roll(x, -2, axis=1)
+    y_last = np.roll(y, -2, axis=1)
+    areas = x_next * y_last - x_last * y_next
     area = areas.sum(axis=1, keepdims=True)
     weights = np.divide(areas, area, out=np.full_like(areas, -1.0), where=area != 0)
     triangle = int(np.argmax(weights.min(axis=1)))

@@ -58,7 +58,8 @@ def stress_series(central_stress: float) -> NDArray[np.float64]:
     for n in range(1, TERMS):
         k = n - 1
         target = -0.125 if k == 0 else 0.0
-        curvature[k] = (target - square[1 : k + 1] @ curvature[k - 1 :: -1][:k]) / square[0]
+        earlier = curvature[k - 1 :: -1][:k]
+        curvature[k] = (target - square[1 : k + 1] @ earlier) / square[0]
         c[n] = curvature[k] / (2 * n * (2 * n + 2))
         square[n] = c[: n + 1] @ c[n::-1]
     return c

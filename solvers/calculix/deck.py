@@ -53,7 +53,8 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
     if element == "S4":
         return ShellMesh(points, quads, mesh.node_sets, len(points))
     # Edge k of a quad joins corners k and k + 1: the order of S8R's midsides.
-    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2), axis=2)
+    following = np.roll(quads, -1, axis=1)
+    ends = np.sort(np.stack([quads, following], axis=2), axis=2)
     edges, edge_of, used = np.unique(
         ends.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
     )

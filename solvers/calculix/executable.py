@@ -149,7 +149,10 @@ _TOO_SMALL = re.compile(rf"{_GAVE_UP.pattern}|max\. # of increments", re.IGNOREC
 def increments(sta: Path) -> list[Increment]:
     """Read the increments of a .sta file so far, without attempts given up or half a line."""
     rows = [row for row in number_rows(sta) if len(row) >= 5]
-    return [Increment(int(a), int(b), int(d), time) for a, b, _, d, time, *_ in rows]
+    return [
+        Increment(int(step), int(increment), int(iterations), time)
+        for step, increment, _, iterations, time, *_ in rows
+    ]
 
 
 def reason(

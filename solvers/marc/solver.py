@@ -394,8 +394,12 @@ MEANINGS = {
 
 def increments(sts: Path) -> list[Increment]:
     """Read the increments of a .sts file, including repeated ones: lines of 13 numbers."""
-    rows = [row for row in number_rows(sts) if len(row) == 13]
-    return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
+    read = []
+    for row in number_rows(sts):
+        if len(row) == 13:
+            step, increment, cycles = map(int, row[:3])
+            read.append(Increment(step, increment, cycles, row[10]))
+    return read
 
 
 def exit_number(*files: Path) -> int | None:

@@ -79,7 +79,8 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
         If an open edge lies in no symmetry plane, that is in no plane normal to an axis along which
         its nodes are held; or if planes close the cavity on all six sides.
     """
-    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
+    following = np.roll(quads, -1, axis=1)
+    sides = np.stack([quads, following], axis=2).reshape(-1, 2)
     edges, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
     border = edges[count == 1]
     is_fixed = np.zeros(points.shape, dtype=bool)

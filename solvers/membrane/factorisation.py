@@ -45,7 +45,8 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
     tolerance = PLANE_TOLERANCE * float(np.ptp(along))
     rows = np.repeat(quads, 4, axis=1).ravel()
     columns = np.tile(quads, (1, 4)).ravel()
-    graph = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
+    shape = len(points), len(points)
+    graph = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=shape)
     ends = (np.flatnonzero(np.abs(along - at) <= tolerance) for at in (along.min(), along.max()))
     return [_from(graph, end) for end in ends]
 
@@ -226,9 +227,8 @@ def tangent_for(
     # In any order, the twelve unknowns of a quad make a band of eleven diagonals or more.
     if (3 * 11 + 1) * len(free) > largest_band:
         return SparseTangent(rows, columns, is_free, Dissection(quads, points), place)
-    pattern = scipy.sparse.csr_matrix(
-        (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
-    )
+    places = rows[is_free], columns[is_free]
+    pattern = scipy.sparse.csr_matrix((np.ones(len(places[0])), places), shape=(len(free),) * 2)
     orders = [scipy.sparse.csgraph.reverse_cuthill_mckee(pattern, symmetric_mode=True)]
     orders.append(np.arange(len(free)))  # that of a strip goes row by row, in half the width
     for nodes in swept(quads, points) if is_tube else []:

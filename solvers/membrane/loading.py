@@ -394,8 +394,8 @@ def lagrange(x: Array, values: Array, position: float) -> Array:
     x, values : array
         The positions (k,) and the values there, (k, nodes, 3).
     """
-    weights = [
-        math.prod((position - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
-        for a in range(len(x))
-    ]
+    weights = []
+    for a in range(len(x)):
+        others = [b for b in range(len(x)) if b != a]
+        weights.append(math.prod((position - x[b]) / (x[a] - x[b]) for b in others))
     return np.einsum("a,ank->nk", weights, values)
