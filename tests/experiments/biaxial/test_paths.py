@@ -92,6 +92,9 @@ def test_last_cycle_of_a_ratio_counts_by_default(biaxial_table):
     np.testing.assert_allclose(path.strain_change, path.strain - path.strain[0])
     # Five cycles of 0.02 % came before; 2:1 begins at another load along the fill.
     assert path.residual[0] == pytest.approx(path.strain[0, 0] - biaxial_table.strain[0, 0])
+    for of_ratio in last:
+        expected = of_ratio.strain[0] - biaxial_table.strain[0]
+        np.testing.assert_allclose(of_ratio.residual, expected, atol=1e-12)
     inside, thin = path.between(5.0, 20.0), path.thinned(7)
     assert inside.load.max() <= 20.0 and inside.load[0].max() >= 5.0
     assert len(path.between(2.0, 30.0).load) == 30

@@ -387,3 +387,13 @@ def test_dome_along_the_sheet_is_named_where_dz_has_a_fifth_of_it(dome, axis):
     (doubt,) = doubts_at(*dome)
     assert doubt.sure and f"exchange {axis} and dz" in doubt.text
     assert doubts_at(*dome[:2], 1.7) == [] == doubts_at(0.3, 0.2, 0.0)
+
+
+@pytest.mark.parametrize(("scatter", "count"), [(0.99, 0), (1.01, 1)])
+def test_scatter_of_a_twentieth_of_the_rise_is_a_sure_doubt(scatter, count):
+    frame = SimpleNamespace(count=0, scatter=scatter, field=SimpleNamespace(pressure=0.09))
+    rises = np.array([10.0, 20.0])
+    view = SimpleNamespace(fields=[None], rises=rises, gross_outliers=lambda field: frame)
+    found = list(doubts.outliers(view))
+    assert len(found) == count
+    assert all(doubt.sure and "dz scatters by 1 mm" in doubt.text for doubt in found)
