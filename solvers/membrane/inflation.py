@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import SolverFailure
 from ...meshes.cylinder_model import ClosedGas, InflatedModel
 from ...notes import Note
 from ..base import SNAP, History
@@ -123,7 +123,8 @@ def analyse_inflated(
     membrane : ClosedMembrane
     model : InflatedModel
     request : RunRequest
-        It must have no guess.
+        Its guess is not used, as the way from the unloaded state decides where a membrane that
+        snaps or wrinkles ends.
 
     Returns
     -------
@@ -134,13 +135,10 @@ def analyse_inflated(
 
     Raises
     ------
-    InputError
-        If there is a guess.
     SolverFailure
         If no equilibrium is found.
     """
-    if request.guess is not None:
-        raise InputError(None, "guess", "a closed membrane takes none")
+    request = replace(request, guess=None)
     membrane.wrinkle[:] = 0.0
     neighbours = Neighbours(membrane, request.parameters)
     levels = np.array(model.pressures)

@@ -187,7 +187,7 @@ def correlated_noise_root(length):
     return np.linalg.cholesky(np.exp(-((distance / length) ** 2)) + 1e-9 * np.eye(len(NODES)))
 
 
-TIGHT = 1e-10
+TIGHT = 1e-11
 PRESSURE = Nuisance("pressure_offset", -18.0, 50.0, "kPa", "pressure_offset", 1e-3)
 SHIFTS = tuple(Nuisance(f"offset_{axis}", -20.0, 20.0, "mm") for axis in "xyz")
 BUBBLE_OF_100_MM = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.12, 0.2])
