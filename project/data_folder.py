@@ -139,9 +139,12 @@ DIRECTION_WORDS = {"warp": {*WARP, "md"}, "fill": {*FILL, "td", "cd", "xd"}}
 
 #: Words of curvatures and of strains.
 QUANTITY_WORDS = {
-    "curvature": {"curvature", "curv", "kappa", "krümmung"},
+    "curvature": {"curvature", "curv", "kappa", "krümmung", "krümmungsradius"},
     "strain": {"strain", "dehnung", "eps", "epsilon"},
 }
+
+#: Words of curvatures that are radii.
+RADIUS_WORDS = {"radius", "krümmungsradius"}
 
 #: Largest curvature of a table without units that is in 1/mm: bubbles have radii above 10 mm.
 LARGEST_CURVATURE = 0.1
@@ -255,14 +258,24 @@ def read_apex(file: Path) -> GaugedBubble:
     apex.add_unit("pressure_unit", table, [table.column("pressure")], "kPa")
     curvatures = [name for key, name in columns.items() if key.startswith("curvature")]
     if curvatures:
-        apex.keys["curvature_is"] = "curvature"
-        apex.remarks["curvature_is"] = '1/R; "half" of it, or the "radius"?'
-        largest = max(np.nanmax(np.abs(table.table.numbers(name))) for name in curvatures)
-        unit = "1/mm" if largest < LARGEST_CURVATURE else "1/m"
-        apex.add_unit("curvature_unit", table, curvatures, unit)
+        _add_curvatures(apex, table, curvatures)
     strains = [name for name in columns.values() if name not in curvatures]
     apex.add_unit("strain_unit", table, strains, "mm/mm")
     return apex
+
+
+def _add_curvatures(apex: GaugedBubble, table: MachineTable, columns: Sequence[str]) -> None:
+    """Add what columns of curvatures hold, and their unit; those in a length are radii."""
+    words = {word.casefold() for name in columns for word in WORD.findall(name)}
+    largest = max(np.nanmax(np.abs(table.table.numbers(name))) for name in columns)
+    if RADIUS_WORDS & words or any(table.units[name] in LENGTH_UNITS for name in columns):
+        apex.keys["curvature_is"] = "radius"
+        unit = "mm" if largest > 1 / LARGEST_CURVATURE else "m"
+    else:
+        apex.keys["curvature_is"] = "curvature"
+        apex.remarks["curvature_is"] = '1/R; "half" of it, or the "radius"?'
+        unit = "1/mm" if largest < LARGEST_CURVATURE else "1/m"
+    apex.add_unit("curvature_unit", table, columns, unit)
 
 
 def pressure_of(file: Path) -> float | None:

@@ -225,6 +225,19 @@ def test_curvatures_say_what_has_to_be_confirmed(tmp_path):
     assert read_apex(per_metre).keys["curvature_unit"] == "1/m"
 
 
+@pytest.mark.parametrize("heading", ["curvature warp (mm)", "Krümmungsradius Kette (m)"])
+def test_curvatures_in_a_length_are_radii(tmp_path, heading):
+    apex = read_apex(table(tmp_path, f"p (kPa),{heading}", [(1, 900.0), (2, 600.0)]))
+    assert apex.keys == {"columns": {"curvature_warp": heading}, "curvature_is": "radius"}
+    assert not apex.remarks
+
+
+@pytest.mark.parametrize(("largest", "unit"), [(900.0, "mm"), (0.9, "m")])
+def test_unit_of_a_radius_is_by_its_size(tmp_path, largest, unit):
+    apex = read_apex(table(tmp_path, "p (kPa),curvature radius fill", [(1, largest), (2, 0.5)]))
+    assert (apex.keys["curvature_is"], apex.keys["curvature_unit"]) == ("radius", unit)
+
+
 def test_pressures_of_profiles_stand_in_names_or_heads(tmp_path):
     assert pressure_of(table(tmp_path, "s,dz", name="scan_35.5kPa.csv")) == pytest.approx(35.5)
     head = "# test 1 p_bar=0.528; x axis\ns,dz"
