@@ -346,17 +346,23 @@ def _text_for_data(
         usual = {**usual, "law_symmetry": "balanced"}  # warp and fill cannot be told apart
     draft = {**usual, **settings, **{size: SIZES[size][1] for size in open_sizes}}
     draft["bounds"] = {"E1": [1, 30000], "E2": [1, 30000], "G12": [0.1, 3000]}
-    project = _read_draft(
-        _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
-    )
-    sizes = dict.fromkeys(open_sizes)
+    draft["folder"] = data.resolve().as_posix()
     bubbles = [test for test in tests if test["kind"] == "bubble"]
+    problems = Problems()
+    project = _read_draft(_project_text(tests, draft), problems)
+    sparse = [e.field for e in problems.errors if e.field.endswith("points.pressure.frames")]
+    if sparse:  # fewer frames have a pressure: all of them are taken
+        for number, values in enumerate(bubbles):
+            values["all_frames"] = any(field.startswith(f"bubble[{number}].") for field in sparse)
+        project = _read_draft(_project_text(tests, draft), Problems())
+    sizes = dict.fromkeys(open_sizes)
     for number, values in enumerate(bubbles, start=1):
         # Without a name in the draft a test is named for its kind; one that is unreadable lacks.
         test = project.tests.get(f"bubble {number}" if len(bubbles) > 1 else "bubble")
         if not isinstance(test, BubbleTest):
             continue
-        values["recorded"] = _loaded_pressures(test.pressures)
+        if {"rate", "pressure_unit"}.isdisjoint(open_sizes):
+            values["recorded"] = _loaded_pressures(test.pressures)
         if test.of_clamp:
             values |= {"radius": round(test.outline.radius, 2), "radius_found": True}
     law = {} if without_cameras and "radius" in open_sizes else _law_for_data(project)

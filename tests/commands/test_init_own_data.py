@@ -163,6 +163,24 @@ def check_of_tables(place, tables, *options):
     return table_of(place)
 
 
+def test_few_of_many_frames_under_pressure_are_all_taken(tmp_path):
+    pressures = [0.0] * 8 + [0.1, 20, 60, 100, 150, 200, 280]
+    files = sorted((part_of_data(tmp_path, "bubble") / "bubble").iterdir())
+    for number, (file, pressure) in enumerate(zip(files, pressures, strict=True)):
+        file.rename(file.with_name(f"step_{number:02d}_{pressure:g}kPa.csv"))
+    in_process("init", "fabric", "--own", "--data", "data", "--thickness", 0.83, cwd=tmp_path)
+    (bubble,) = table_of(tmp_path)["bubble"]
+    assert bubble["pressures"] == pressures[9:]
+    assert bubble["data"]["points"]["pressure"] == {"from_name": True}
+
+
+def test_pressures_by_a_rate_that_is_assumed_are_not_written(tmp_path):
+    part_of_data(tmp_path, "bubble", "pressure.csv")
+    in_process("init", "fabric", "--own", "--data", "data", "--thickness", 0.83, cwd=tmp_path)
+    (bubble,) = table_of(tmp_path)["bubble"]
+    assert "pressures" not in bubble and bubble["data"]["points"]["pressure"]["frames"] == 12
+
+
 APEX = (9.6, 12.1, 15.2, 18.3)
 PRESSURES = (10, 20, 40, 70)
 
