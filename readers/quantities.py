@@ -32,10 +32,12 @@ WORDS = {
     }.items()
 }
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
-LOADS = frozenset("n f force load kraft stress spannung tension".split())
-STRAINS = frozenset("eps epsilon strain dehnung".split())
+LOADS = frozenset("n f force load kraft stress spannung tension sigma σ".split())
+STRAINS = frozenset("e eps epsilon ε strain dehnung".split())
 WARP = frozenset("w warp kette chaîne chaine x".split())
 FILL = frozenset("f fill weft schuss trame y".split())
+#: A symbol with the letter of its yarn: "Nx", "exx", "εy".
+_SYMBOL_OF_YARN = re.compile(r"(\w+?)(w|f|xx?|yy?)")
 #: Quantities that need a word of each of two sets.
 PAIRS = {
     f"{yarn} {measured}": (words, along)
@@ -114,7 +116,9 @@ def means(name: str, quantity: str) -> bool:
 def _has_pair(words: list[str], measured: frozenset[str], yarn: frozenset[str]) -> bool:
     """Return whether one word names the measured quantity and another word the yarn."""
     # One word is not both: F is a force before the yarn, and the fill after another word.
-    if not any(a in measured and b in yarn for a, b in permutations(words, 2)):
+    symbols = [match for match in map(_SYMBOL_OF_YARN.fullmatch, words) if match]
+    pairs = [*permutations(words, 2), *((match[1], match[2][0]) for match in symbols)]
+    if not any(a in measured and b in yarn for a, b in pairs):
         return False
     return (OTHER_QUANTITIES - measured).isdisjoint(words)
 

@@ -123,6 +123,8 @@ def test_biaxial_file_is_read_in_newtons_per_millimetre(biaxial_table):
          1e3, 10),
         ("Load ratio;F_warp (N/mm);F_weft (N/mm);Strain warp (mm/mm);Strain weft (mm/mm)", 1, 0.01),
         ("ratio;Stress x (N/cm);Stress y (N/cm);epsilon_x (%);epsilon_y (%)", 10, 1),
+        ("Verhältnis;Nx [kN/m];Ny [kN/m];exx [%];eyy [%]", 1, 1),
+        ("ratio;σx (N/mm);σy (N/mm);εx (%);εy (%)", 1, 1),
     ],
 )  # fmt: skip  # fmt: skip
 def test_biaxial_columns_of_other_names_and_units(tmp_path, head, load, strain):
