@@ -134,7 +134,7 @@ class CompareSection(Section):
     noise
         Standard deviation of one measured y.
     weight
-        Weight beside the other comparisons of the deck.
+        Weight beside the other comparisons of the deck; 0 leaves it out.
     """
 
     name: Name | None = None
@@ -323,8 +323,12 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
     for number, compare in enumerate(section.compare):
         at = f"compare[{number}]"
         compared = _read_compared(compare, place, at, section.folder)
+        if not compare.weight:
+            continue
         if matched.setdefault(compared.name, compared) is not compared:
             raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
+    if not matched:
+        raise place.error("compare", "expected a weight above 0: nothing would be matched")
     parameters = _unknowns(section, place)
     condition = str(section.parameters.get(FEASIBLE, ""))
     values = {parameter.name: parameter.start for parameter in parameters}

@@ -42,6 +42,14 @@ def test_comparisons_have_names_of_their_own(tmp_path, monkeypatch):
     assert "deck[0].compare[1].name: 'force' is there twice; name one of them" in message
 
 
+def test_comparison_of_weight_zero_is_left_out(tmp_path, monkeypatch):
+    path = bar_project(tmp_path, monkeypatch)
+    text = path.read_text()
+    compare = text[text.index("[[deck.compare]]") :]
+    path.write_text(f'{text}\n{compare}\nname = "again"\nweight = 0\n')
+    assert [*read_project(path).tests["bar"].matched] == ["force"]
+
+
 MARC = """
 [solver.marc]
 executable = "PROGRAM"
@@ -102,6 +110,7 @@ def test_deck_of_marc_runs_in_the_stand_in(tmp_path, monkeypatch, marc):  # noqa
         ('result = "force_N"', 'reaction = "z"', "compare[0].y: expected a node set (set), or a"),
         ("noise = 0.002", "nois = 0.002", "compare[0].nois: unknown key; did you mean 'noise'"),
         ('"solve.py"', "", "program: there is no program nothing; name another"),
+        ("noise = 0.002", "weight = 0", "compare: expected a weight above 0: nothing would be"),
         ('result = "travel_mm"', "time = 1.0", "compare[0]: a table has no times and no nodes"),
     ],
 )
