@@ -1,7 +1,7 @@
 """Errors of a law at a test, or at a part of a test, to which it was not fitted."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from ..experiments.base import FittedTest, MakeSolver, Masks, PreparedTest, Weighting
 from ..experiments.forward import notes_beyond, strains_of, unstable_words
 from ..experiments.registry import presenter_of
+from ..inference.comparison import Comparison
 from ..inference.noise import misfits
 from ..inference.nuisance_fit import fit_nuisance, problem_at
 from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
@@ -66,6 +67,7 @@ def held_out(
     nuisance: NuisanceValues | None = None,
     name: str = "",
     parameters: NuisanceValues | None = None,
+    thickness: float | None = None,
 ) -> HeldOut:
     """Run a test with a law, and return its errors with nuisance unknowns fitted or given.
 
@@ -85,9 +87,12 @@ def held_out(
         Name of the part; by default that of the test.
     parameters : dict, optional
         Nuisance values of a fit to other tests: it decides on parameters of decks that it has.
+    thickness : float, mm, optional
+        That of the fit of the law; by default that of the fabric.
     """
     name = name or prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
+    comparisons = _with_thickness(comparisons, thickness)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
     status = ""
@@ -111,10 +116,22 @@ def held_out(
     if nuisance is not None:
         return HeldOut(name, error, rms, units, notes, analyses=problem.analyses)
     findings = presenter_of(prepared.test.kind).findings(
-        prepared, fitted_test(prepared, law, make_solver, problem, point)
+        prepared, fitted_test(prepared, law, make_solver, problem, point, thickness)
     )
     words = findings.quality, findings.numbers
     return HeldOut(name, error, rms, units, notes, *words, problem.analyses)
+
+
+def _with_thickness(
+    comparisons: Sequence[Comparison], thickness: float | None
+) -> tuple[Comparison, ...]:
+    """Return comparisons with models of a thickness (mm), or as they are if it is None."""
+    if thickness is None:
+        return tuple(comparisons)
+    return tuple(
+        replace(c, model=c.model.with_parameters({"thickness": thickness - c.model.thickness}))
+        for c in comparisons
+    )
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
@@ -137,6 +154,7 @@ def fitted_test(
     make_solver: MakeSolver,
     problem: FitProblem,
     point: Evaluation,
+    thickness: float | None,
 ) -> FittedTest:
     """Return a test as a fit would leave it, weighted as if it were the only test."""
     nuisance: dict[str, float] = {}
@@ -144,7 +162,7 @@ def fitted_test(
         nuisance |= values
     reached = reached_by(point)
     return FittedTest(
-        comparisons=prepared.comparisons(make_solver, Weighting()),
+        comparisons=_with_thickness(prepared.comparisons(make_solver, Weighting()), thickness),
         histories=point.histories,
         nuisance=nuisance,
         law=law,

@@ -268,7 +268,11 @@ class Fit(Reported):
         parameters = nuisance_of(self.problem, self.best.point.unknowns)
         return {
             prepared.test.name: held_out(
-                prepared, law, self.setup.make_solver, parameters=parameters
+                prepared,
+                law,
+                self.setup.make_solver,
+                parameters=parameters,
+                thickness=self.thickness,
             )
             for prepared in self.setup.predicted
         }

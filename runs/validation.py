@@ -288,8 +288,11 @@ def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
     # The moduli are known up to the strains of the remaining data only, as those of a card are.
     law = replace(law, strain_range=np.minimum(reached_by(point), law.strain_range))
     nuisance = nuisance_of(problem, unknowns)
+    thickness = next(iter(nuisance.values())).get("thickness")
     prepared = setup.tests[part.test]
-    at_part = held_out(prepared, law, masked.make_solver, part.alone, nuisance, part.name)
+    at_part = held_out(
+        prepared, law, masked.make_solver, part.alone, nuisance, part.name, thickness=thickness
+    )
     return replace(at_part, analyses=analyses + problem.analyses + at_part.analyses)
 
 
@@ -529,9 +532,18 @@ class FormFits:
             fit = self.fit(remaining, f"{self.form}: without {omitted}", f"without-{number}")
             parameters = nuisance_of(fit.problem, fit.best.point.unknowns)
             predicted = held_out(
-                prepared, fit.reached_law, fit.setup.make_solver, parameters=parameters
+                prepared,
+                fit.reached_law,
+                fit.setup.make_solver,
+                parameters=parameters,
+                thickness=fit.thickness,
             )
-            fitted = held_out(prepared, fit_to_all.reached_law, fit_to_all.setup.make_solver)
+            fitted = held_out(
+                prepared,
+                fit_to_all.reached_law,
+                fit_to_all.setup.make_solver,
+                thickness=fit_to_all.thickness,
+            )
             predicted = replace(predicted, analyses=fit.best.analyses + predicted.analyses)
             judged.append(Judged(self.form, predicted, fitted))
         return judged
@@ -546,7 +558,15 @@ class FormFits:
         judged = []
         for part, at_part in zip(parts, predicted, strict=True):
             prepared = setup.tests[part.test]
-            fitted = held_out(prepared, law, setup.make_solver, part.alone, nuisance, part.name)
+            fitted = held_out(
+                prepared,
+                law,
+                setup.make_solver,
+                part.alone,
+                nuisance,
+                part.name,
+                thickness=fit_to_all.thickness,
+            )
             judged.append(Judged(self.form, at_part, fitted))
         return judged
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +12,7 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.forward import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
-from bubblefit.project.project import chosen_cards
+from bubblefit.project.project import chosen_cards, read_project
 from bubblefit.runs import validation
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import simulate_cards
@@ -156,6 +157,45 @@ def test_omitted_direction_is_judged_with_compliance_of_other(tmp_path):
         errors.append(errors_without(path, "directions"))
     assert min(errors[0]) > 0.03
     assert errors[1] == pytest.approx(errors[0], rel=0.03)
+
+
+#: E1 is bounded to 200 MPa: only a thicker fabric than 0.8 mm carries the loads of the warp.
+THICKER = (
+    ("E1 = [0.02, 2.0]", "E1 = [0.02, 0.2]"),
+    ("seed = 7\n", "seed = 7\n[fit.unknowns]\nthickness = { bounds = [0.5, 2.0], prior = 1.0 }\n"),
+)
+
+
+@pytest.mark.filterwarnings("ignore:E1 touches")
+@pytest.mark.parametrize("leave", ["tests", "directions"])
+def test_fitted_thickness_is_that_of_what_is_left_out(tmp_path, leave):
+    project = read_project(constant_strips(tmp_path, *THICKER))
+    found = validation.validate(project, leave=leave, starts=1)
+    whole = bf.fit(project, starts=1, jobs=1)
+    assert whole.thickness > 1.1
+    errors = {name: misfit.rms for name, misfit in whole.misfits.items()}
+    for judged in found.judged:
+        assert judged.fitted.rms == pytest.approx(
+            {n: errors[n] for n in judged.fitted.rms}, rel=1e-3
+        )
+    predicted = found.judged[-1 if leave == "tests" else 0].predicted
+    products = {"tests": 330.0, "directions": 370.0}  # of the remaining warp strips, at 0.8 mm
+    strain, moduli = (STRAIN, (300, 360))
+    if leave == "tests":
+        strain = np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= 2.5] / 20)
+        moduli = STRIP_MODULI["two"]["warp"]
+    rms = np.sqrt(np.mean([(20 * (products[leave] - e) * strain) ** 2 for e in moduli]))
+    assert [*predicted.rms.values()] == pytest.approx([rms], rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore:E1 touches")
+def test_test_of_weight_zero_is_predicted_with_the_fitted_thickness(tmp_path):
+    project = read_project(constant_strips(tmp_path, ("weight = 3.0", "weight = 0"), *THICKER))
+    fit = bf.fit(project, starts=1, jobs=1)
+    modulus = fit.law.modulus("E1", 0.0) * fit.thickness / 0.8
+    rms, relative = warp_of_two(modulus)
+    assert fit.predicted["two"].rms == {"two: warp": pytest.approx(rms, rel=1e-3)}
+    assert fit.predicted["two"].error == pytest.approx(relative, rel=1e-3)
 
 
 def warp_of_two(modulus):
