@@ -179,51 +179,65 @@ def estimate_of(setup: FitSetup) -> Estimate:
     return Estimate(setup, problem, best, gaps, seconds, notes)
 
 
-def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[Note]]:
-    """Return the comparisons that an estimate matches, and notes on tests without any."""
+def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[float], list[Note]]:
+    """Return the comparisons that an estimate matches, their weights, and notes on tests without.
+
+    A weight is that of the test times that of the part.
+    """
     comparisons: list[Comparison] = []
+    weights: list[float] = []
     notes = []
-    for prepared in setup.tests:
+    for prepared, weighting in zip(setup.tests, setup.weightings, strict=True):
         try:
-            comparisons += prepared.virtual_work(setup.make_leading)
+            of_test = prepared.virtual_work(setup.make_leading)
         except InputError as error:
             problem = f"{error.field} {error.problem}"
             notes.append(Note(NOT_ESTIMATED, problem, prepared.test.name))
+            continue
+        comparisons += [replace(comparison, nuisance=()) for comparison in of_test]
+        weights += [weighting.weight * comparison.weight for comparison in of_test]
     if not comparisons:
         raise InputError(setup.project.path, "tests", f"no estimate: {notes[0]}")
-    return [replace(comparison, nuisance=()) for comparison in comparisons], notes
+    return comparisons, weights, notes
 
 
 @one_blas_thread()
 def _fit_all(setup: FitSetup) -> tuple[FitProblem, Evaluation, list[Note]]:
     """Fit the equations of all tests; notes are on those without. InputError, SolverFailure."""
-    comparisons, notes = _comparisons(setup)
-    problem, point = _fit(setup, comparisons, {})
+    comparisons, weights, notes = _comparisons(setup)
+    problem, point = _fit(setup, comparisons, weights, {})
     if len(comparisons) > 1:  # what each leaves is its noise, so that none outvotes the others
         misfit_of = misfits(problem, point.residual).items()
         noise_of = {name: max(misfit.rms, misfit.noise) for name, misfit in misfit_of}
-        problem, point = _fit(setup, comparisons, noise_of)
+        analyses = problem.analyses
+        problem, point = _fit(setup, comparisons, weights, noise_of)
+        problem.analyses += analyses
     return problem, point, notes
 
 
 def _fit(
-    setup: FitSetup, comparisons: Sequence[Comparison], noise_of: Mapping[str, float]
+    setup: FitSetup,
+    comparisons: Sequence[Comparison],
+    weights: Sequence[float],
+    noise_of: Mapping[str, float],
 ) -> tuple[FitProblem, Evaluation]:
     """Fit the equations weighted by noise from the middle of the bounds; raise SolverFailure.
 
-    `noise_of` is the standard deviation of one value by name of a comparison, in the unit of its
-    data and in place of their least noise.
+    `weights` multiply the norms of the comparisons beside that. `noise_of` is the standard
+    deviation of one value by name of a comparison, in the unit of its data and in place of their
+    least noise.
     """
     unweighted = setup.problem_of(comparisons)
     factors = []
-    for comparison in unweighted.comparisons:
+    for comparison, weight in zip(unweighted.comparisons, weights, strict=True):
         objective = comparison.objective
         noise = noise_of.get(comparison.name, objective.least_noise)
         # Minimising norms weighs the squares of a block by the inverse of its norm, which for noise
         # alone is n / correlated_count in a block of n. So each value weighs by the inverse of its
         # variance, and values that err together weigh as one.
         root_of_size = np.sqrt(np.repeat(objective.sizes, objective.sizes))
-        factors.append(objective.scale * root_of_size / (objective.correlated_count * noise))
+        root_of_size *= weight / (objective.correlated_count * noise)
+        factors.append(objective.scale * root_of_size)
     priors = [n for n in unweighted.unknowns.nuisance.all if n.prior is not None]
     factors.append(np.array([len(priors) ** 0.5 / nuisance.weight for nuisance in priors]))
     problem = WeightedProblem.of(unweighted, np.concatenate(factors))

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.inference.noise import Noise
+from bubblefit.inference.problem import FitProblem
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.check import check
 from bubblefit.runs.estimate import GAP, closed_form_coefficients, estimate_of, with_start
 from bubblefit.storage.writing import json_text
 
-from ..builders.projects import edited_project, fit_setup, project_file
+from ..builders.projects import constant_strips, edited_project, fit_setup, project_file
 from ..builders.unknowns import project as project_with_unknowns
 from ..support.commands import in_process
 from ..support.paths import EXAMPLES, KNOWN
@@ -80,6 +81,32 @@ def test_biaxial_tests_and_strips_are_estimated(strips_project):
     law = bf.estimate(strips_project).law
     for name in ("E1", "E2"):
         assert law.modulus(name, 0.01) == pytest.approx(fitted.modulus(name, 0.01), rel=0.1)
+
+
+@pytest.mark.parametrize(("weight", "modulus"), [(1e-4, 330.0), (1e4, 370.0)])
+def test_weights_of_tests_count_in_an_estimate(tmp_path, weight, modulus):
+    setup = fit_setup(constant_strips(tmp_path, ("weight = 3.0", f"weight = {weight}")))
+    assert estimate_of(setup).law.modulus("E1", 0.0) == pytest.approx(modulus, rel=1e-3)
+
+
+def test_weights_of_directions_count_in_an_estimate(tmp_path):
+    balanced = ('form = "constant"', 'form = "constant"\nsymmetry = "balanced"')
+    weights = ('files = ["one.csv"]', 'files = ["one.csv"]\n[strips.weights]\nfill = 1e-4')
+    path = constant_strips(tmp_path, balanced, ("E2 = [0.03, 1.0]\n", ""), weights)
+    setup = fit_setup(path, "one")
+    assert estimate_of(setup).law.modulus("E1", 0.0) == pytest.approx(330.0, rel=1e-3)
+
+
+def test_analyses_of_both_rounds_of_an_estimate_are_counted(tmp_path, monkeypatch):
+    counted = []
+    evaluate = FitProblem.evaluate
+
+    def count(*arguments):
+        counted.append(1)
+        return evaluate(*arguments)
+
+    monkeypatch.setattr(FitProblem, "evaluate", count)
+    assert estimate_of(fit_setup(constant_strips(tmp_path))).problem.analyses == len(counted)
 
 
 def test_estimate_is_the_same_from_command_page_and_python(tmp_path):
