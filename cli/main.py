@@ -39,7 +39,7 @@ COMMANDS = {
     "init": ("start", "Write a commented project: an example, or one for your own tests."),
     "docs": ("start", "Read the documents of this version."),
     "schema": ("start", "Print the JSON Schema of the project file, for editors."),
-    "verify": ("tools", "Compare with published numbers and closed forms."),
+    "verify": ("verify", "Compare with published numbers and closed forms."),
     "cache": ("tools", "Show or prune the cache of solver runs."),
     "doctor": ("tools", "List the solvers found, and test that they can run the law."),
 }

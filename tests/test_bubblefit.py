@@ -117,6 +117,7 @@ FIRST_USED = {"pandas", "PIL.Image", "numba"} | {
 
 
 KNOWN = "examples/bubble-known-solution/project.toml"
+BEND = "examples/bend-valmex7318/project.toml"
 
 
 @pytest.mark.parametrize(
@@ -132,6 +133,8 @@ KNOWN = "examples/bubble-known-solution/project.toml"
          {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
           "scipy.spatial", "scipy.linalg", "bubblefit.experiments.bubble.prepared",
           "bubblefit.materials.exports"}),
+        (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{BEND}')",
+         {"scipy.sparse", "numba", "bubblefit.solvers.membrane.solver"}),
         ("import bubblefit.cli.check", {"numpy", "pydantic", "rich", "bubblefit.project"}),
         ("import bubblefit.cli.export", {"rich", "bubblefit.solvers.registry"}),
         ("import bubblefit.cli.start", {"rich", "jinja2", "numpy", "pydantic"}),
@@ -140,6 +143,8 @@ KNOWN = "examples/bubble-known-solution/project.toml"
          {*FIRST_USED, "bubblefit.experiments.base", "bubblefit.project"}),
         ("import bubblefit.cli.tools",
          {*FIRST_USED, "bubblefit.reports", "bubblefit.experiments", "bubblefit.project"}),
+        ("from bubblefit.cli.main import main; main(['verify', '-h'], standalone_mode=False)",
+         {"numpy", "pydantic", "rich", "bubblefit.project"}),
         ("import bubblefit as b; from bubblefit.runs.check import check_trusted;"
          f" check_trusted(b.read_project(b.__path__[0] + '/{KNOWN}'))",
          {"bubblefit.experiments.strips", "bubblefit.experiments.cylinder"}),

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
+from ...lazy_modules import LazyFunction
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel, BraidedWall
 from ...meshes.cylinder_model import CurveReading, CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error
 from ...solvers.base import Array, History
-from ...solvers.membrane.solver import MembraneSolver
 from ..forward import RunRecord
 
 #: Relative difference of deflections up to which they count as equal.
@@ -494,6 +494,8 @@ SENSITIVE_RANGE = 3.3
 ANGLE_ERROR = 0.5
 #: Law that a solver asks for. The model does not use it: wall and cords have their own stiffness.
 UNUSED_LAW = HypoelasticLaw.linear(1.0, 1.0, 1.0)
+#: Solver of a braid near the neutral angle; no other test imports it when it is read.
+membrane_solver = LazyFunction("bubblefit.solvers.membrane.solver", "MembraneSolver")
 
 
 def is_near_neutral(model: object) -> bool:
@@ -546,7 +548,7 @@ def _load_at(model: BeamModel, angle: float, places: Mapping[str, float]) -> flo
     assert isinstance(model.section.wall, BraidedWall)
     try:
         section = replace(model.section, wall=replace(model.section.wall, angle=angle))
-        load = MembraneSolver().run(replace(model, section=section), UNUSED_LAW).load
+        load = membrane_solver().run(replace(model, section=section), UNUSED_LAW).load
     except (InputError, SolverFailure):
         return None
     assert load is not None

@@ -8,10 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.runs.verification import SUBJECTS, Number, bubbles, verify
+from bubblefit.runs.verification import SUBJECTS, Number, bubbles
+from bubblefit.runs.verification.verification import verify
 
-from ..builders.laws import TABLE_4_2
-from ..support.refusals import raised
+from ...builders.laws import TABLE_4_2
+from ...support.refusals import raised
 
 COUNTS = {
     "bars": 4, "hencky": 7, "abaqus": 16, "marc bubble": 7, "strips": 5, "thin walls": 6,
