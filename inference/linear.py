@@ -148,7 +148,8 @@ class LinearisedFit:
 def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     """Return weights that make a sum of squares behave as the sum of block norms does.
 
-    A block weighs by the inverse of the norm of its residual, or of its noise if that is larger.
+    A block weighs by the inverse of the norm of its residual, or of its noise if that is larger:
+    for each prior that of its own, as unknowns that the data leave open add none to the residual.
 
     Parameters
     ----------
@@ -161,12 +162,15 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     (m,) array
     """
     blocks = problem.blocks
-    norms = np.maximum(blocks.norms(residual), blocks.norms(noise.smallest_residual_sigma))
-    norms = np.maximum(norms, blocks.least_norms)
+    of_noise = blocks.norms(noise.smallest_residual_sigma)[blocks.block_of]
+    first_prior = len(residual) - len(problem.unknowns.nuisance.priors[0])
+    of_noise[first_prior:] = noise.smallest_residual_sigma[first_prior:]
+    norms = np.maximum(blocks.norms(residual), blocks.least_norms)[blocks.block_of]
+    norms = np.maximum(norms, of_noise)
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)
-    return 1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.block_of]
+    return 1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:

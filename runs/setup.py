@@ -195,17 +195,19 @@ def with_shared(
 ) -> tuple[Comparison, ...]:
     """Return the comparisons with the unknowns that all tests share before their own unknowns.
 
-    A prior weighs as one value of a block whose norm is that of its noise.
+    A prior weighs as one independent value of a block whose norm is that of its noise.
     """
     comparisons = tuple(comparisons)
     shared = tuple(shared)
     if not shared:
         return comparisons
-    # What one value adds to the norm of a block of noise, the root of its size times its residual.
-    objectives = [comparison.objective for comparison in comparisons]
-    weight = np.median(
-        [o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes)) for o in objectives]
-    )
+    # What one independent value adds to the norm of a block of noise, the root of its size times
+    # its residual; values that err together are one.
+    weights = [
+        o.correlated_count * o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes))
+        for o in (comparison.objective for comparison in comparisons)
+    ]
+    weight = np.median(weights)
     shared = tuple(n if n.prior is None else replace(n, weight=weight) for n in shared)
     changed = []
     names = {n.name for n in shared}

@@ -25,6 +25,7 @@ from bubblefit.inference.linear import (
     posteriors_of,
     residual_of,
     second_order_terms,
+    weights_of,
 )
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
@@ -38,6 +39,8 @@ from bubblefit.runs import certainty as fit_certainty
 from bubblefit.runs.certainty import certainty_of_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ..builders.projects import fit_setup
+from ..builders.unknowns import project as project_with_unknowns
 from .cases import (
     CONSTANT,
     CONSTANT_BOUNDS,
@@ -405,3 +408,14 @@ def test_information_on_a_product_determines_no_factor():
     known = information(slope, 1e-3) + np.diag([0.0, (0.01 * Y[1]) ** -2, 0.0])
     sigma = np.sqrt(np.diag(before.with_information(known).covariance)) / Y
     assert sigma == pytest.approx([10 / np.sqrt(2), 0.01, 10 / np.sqrt(2)], rel=1e-4)
+
+
+def test_prior_weighs_alike_beside_other_priors(tmp_path):
+    weights = []
+    for unknowns in ("nu12.prior = 0.05", "nu12.prior = 0.05\nthickness.prior = 0.04"):
+        problem = fit_setup(project_with_unknowns(tmp_path, unknowns)).problem()
+        residual = np.zeros(len(problem.scale))
+        noise = Noise.from_residual(problem, residual)
+        weight = weights_of(problem, residual, noise)
+        weights.append(weight[problem.rows(2).stop] / weight[0])
+    assert weights[0] == pytest.approx(weights[1])

@@ -19,6 +19,8 @@ from bubblefit.inference.noise import (
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.ndimage import gaussian_filter
 
+from ..builders.projects import fit_setup
+from ..builders.unknowns import project as project_with_unknowns
 from .cases import (
     CONSTANT,
     LAW,
@@ -67,6 +69,18 @@ def test_noise_test_counts_values_and_degrees_of_freedom():
     assert test.probability_of_more + test.probability_of_less == pytest.approx(1.0)
     # Nobody gave it: nothing is tested.
     assert noise_tests(fit_of_fields(None), residual) == {}
+
+
+def test_unknowns_take_degrees_of_freedom_from_their_priors_too(tmp_path):
+    noise = ('match = "points"', 'match = "points"\nnoise = 40.0')
+    unknowns = "nu12.prior = 0.05\nthickness.prior = 0.04"
+    problem = fit_setup(project_with_unknowns(tmp_path, unknowns, noise)).problem()
+    residual = np.random.default_rng(5).standard_normal(len(problem.scale)) * 40 / problem.scale
+    tests = noise_tests(problem, residual).values()
+    count = sum(test.independent for test in tests)
+    free = sum(test.degrees_of_freedom for test in tests)
+    assert problem.unknowns.count == 5
+    assert free == pytest.approx(count * (1 - 5 / (count + 2)))
 
 
 def test_notes_of_noise_name_significant_and_relevant_misfits():

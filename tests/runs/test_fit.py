@@ -19,6 +19,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ..builders.bubbles import DOUBTED_LAW, THICKNESS
 from ..builders.projects import constant_strips, known_bubble
 from ..builders.unknowns import FIT
+from ..builders.unknowns import project as project_with_unknowns
 from ..support.commands import in_process, result_in
 
 SECOND = """
@@ -113,6 +114,13 @@ def test_fit_with_unknown_thickness_adds_its_prior_to_sigma(strips_fit, tmp_path
         assert own == pytest.approx(np.hypot(without, 0.05), rel=0.02)
     assert read_card(tmp_path / "free" / "material.toml").thickness == pytest.approx(said["value"])
     assert "thickness" in pd.read_csv(tmp_path / "free" / "history.csv").columns
+
+
+def test_unknown_keeps_its_prior_beside_scattering_specimens_and_other_priors(tmp_path):
+    for unknowns in ("nu12 = { prior = 0.05 }", "nu12.prior = 0.05\nthickness.prior = 0.04"):
+        project = project_with_unknowns(tmp_path, unknowns, ("nu12 = 0.0", "nu12 = 0.3"))
+        fit = bf.fit(project, starts=1, jobs=1)
+        assert fit.verdicts[0].sigma == pytest.approx(0.05, rel=0.02)
 
 
 PRESSURES = (0.003, 0.02, 0.06, 0.15)

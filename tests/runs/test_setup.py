@@ -32,10 +32,10 @@ def test_shared_unknowns_precede_those_of_comparisons(tmp_path):
     assert (nu12.lower, nu12.upper, nu12.start, nu12.prior) == (0.0, 0.6, 0.0, None)
     assert (thickness.lower, thickness.upper) == pytest.approx((0.4, 1.2))
     assert (thickness.start, thickness.prior, thickness.unit) == (0.8, 0.02, "mm")
-    # Noise of a block's norm: the median of what the strips' objectives have.
+    # One independent value of a block's norm: the median of what the strips' objectives have.
+    objectives = [c.objective for c in problem.comparisons]
     weights = [
-        c.objective.least_noise / c.objective.scale[0] / np.sqrt(c.objective.sizes[0])
-        for c in problem.comparisons
+        o.correlated_count * o.least_noise / o.scale[0] / np.sqrt(o.sizes[0]) for o in objectives
     ]
     assert thickness.weight == pytest.approx(np.median(weights))
     # The start of every comparison's model is its own thickness.
