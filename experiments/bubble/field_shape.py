@@ -385,6 +385,7 @@ class SymmetrySettings:
     max_frames: int = 6  # largest number of images used, those of the highest pressures
     max_parts: int = 4  # largest number of parts of the points whose axes are compared
     min_points_of_part: int = 120  # fewest points of a part, about four for each fitted term
+    min_share: float = 0.01  # of the largest asymmetry: a component with less has no axes to show
 
 
 SYMMETRY = SymmetrySettings()
@@ -446,9 +447,12 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
         parts = [_asymmetries(frames, radius, slice(k, None, count)) for k in range(count)]
         by_part = np.array([part.sum(axis=(0, 1)) for part in parts])
         error = float(np.hypot(error, _scatter(by_part, best)))
-    # A sheet that is not symmetric, say ridged, turns the axes of u_r, u_theta and u_z apart.
-    error = max(error, _scatter(asymmetries.sum(axis=0), best))
     largest = float(total.max())
+    # A sheet that is not symmetric, say ridged, turns the axes of u_r, u_theta and u_z apart. One
+    # that rises alike all around has none in u_z.
+    by_component = asymmetries.sum(axis=0)
+    has_axes = by_component.max(axis=1) > SYMMETRY.min_share * largest
+    error = max(error, _scatter(by_component[has_axes], best))
     clarity = 1.0 - float(total.min()) / largest if largest > 0 else 0.0
     return Axes(float(np.degrees(best)), error, clarity)
 

@@ -168,6 +168,19 @@ def test_marks_are_in_the_axes_of_the_files_where_these_are_turned_over(tmp_path
         np.testing.assert_allclose(found.placement.origin, shift, atol=0.1)
 
 
+@pytest.mark.parametrize("sigma", [0.0, 0.01])
+def test_sheet_that_rises_alike_all_around_has_the_axes_of_its_plane(sigma):
+    frames = [orthotropic_shape(camera_grid(5.0), rise) for rise in (8.0, 20.0, 30.0)]
+    for frame in frames:
+        x, y = frame.points[:, :2].T / CLAMP_RADIUS
+        frame.displacement[:, 2] = frame.displacement[:, 2].max() * (1 - x**2 - y**2)
+    frames = noisy_frames(frames, sigma, np.random.default_rng(2))
+    seen = [seen_by_camera(f, rotation_by("z", 17.5), (0.0, 0.0, 0.0)) for f in frames]
+    options = RegistrationOptions(centre=(0.0, 0.0, 0.0))
+    _, found = register(seen, (CLAMP_RADIUS, CLAMP_RADIUS), options)
+    assert found.warp_angle == pytest.approx(17.5, abs=0.1) and found.warp.error < 0.5
+
+
 def test_registration_errors_reflect_noise():
     """Over eight draws of noise, the errors said are those made, within a factor of two."""
     rng, made, said = np.random.default_rng(4), [], []
