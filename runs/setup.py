@@ -316,9 +316,16 @@ def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
         "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
         "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
         "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
-        "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
+        "data": digest_of([(tuple(c.objective.data), _mark(c.model)) for c in problem.comparisons]),
         "solver": digest_of(fit.solver, problem.solver.identity),
     }
+
+
+def _mark(model: object) -> str:
+    """Return the digest of a model, which may hold what was measured; "" where it has none."""
+    with suppress(TypeError):
+        return digest_of(model)
+    return ""
 
 
 # Coarse meshes ----------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from bubblefit.runs.setup import fingerprints, prepare_fit
 from ..builders.projects import (
     STRIP_ELONGATION,
     STRIP_MODULI,
+    computed_bubble_fields,
     constant_strips,
     fit_setup,
     known_bubble,
@@ -190,3 +191,20 @@ def test_own_test_of_weight_zero_gives_no_arbitrary_modulus():
     test.weight = 0.0
     with pytest.raises(InputError, match="weight: is 0 for every test"):
         bf.fit([test], law, fabric=bf.Fabric("made", thickness=0.8), jobs=1, starts=1)
+
+
+def test_heights_of_the_sheet_at_rest_are_among_the_data_of_a_fit():
+    fields = computed_bubble_fields(pressures=[0.02, 0.06], elements=108, symmetry="full")
+    moved = [field.displacement for field in fields]
+    x, y = fields[0].points.T
+    marks = []
+    for height in (0.0, 1.0):
+        points = np.column_stack([x, y, height * (1.0 - (x**2 + y**2) / 1e4)])
+        keys = {"radius": 100.0, "elements": 108, "symmetry": "full"}
+        sheet = {"surface": "measured"}
+        bubble = bf.Bubble(points, moved, [0.02, 0.06], sheet=sheet, **keys)
+        law = bf.Law("constant", bounds={"E1": [20, 3000], "E2": [20, 3000], "G12": [1, 300]})
+        setup = fit_setup(bf.Project.of(bubble, law, fabric=bf.Fabric("", 0.8)))
+        marks.append(fingerprints(setup, setup.problem()))
+    flat, bulged = marks
+    assert flat.pop("data") != bulged.pop("data") and flat == bulged
