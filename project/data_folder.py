@@ -36,7 +36,7 @@ from ..readers.machine_tables import (
     read_times,
 )
 from ..readers.quantities import DIRECTION_ALIASES, FILL, WARP, columns_of
-from ..readers.tables import NUMBER, parse_number
+from ..readers.tables import NUMBER, UTF_16_MARKS, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS, split_unit
 from ..readers.values_in_files import number_in_name, values_in_file
 from .sections import Settings
@@ -62,10 +62,10 @@ TIMES = "times of the pictures"
 
 #: Words by which heads of exports name the sizes of a specimen.
 SIZES = {
-    "width": r"width|breite",
-    "gauge_length": r"gau?ge[ _]length|messl[äa]nge",
-    "grip_distance": r"grip[ _](?:distance|separation)|einspannl[äa]nge",
-    "thickness": r"thickness|dicke",
+    "width": r"width|breite|largeur",
+    "gauge_length": r"gau?ge[ _]length|messl[äa]nge|longueur de (?:r[ée]f[ée]rence|mesure)",
+    "grip_distance": r"grip[ _](?:distance|separation)|einspannl[äa]nge|entre (?:mors|m[âa]choires)",
+    "thickness": r"thickness|dicke|[ée]paisseur",
 }
 
 #: Units with which files that name none are looked at; a project asks for theirs.
@@ -283,7 +283,7 @@ def pressure_of(file: Path) -> float | None:
     try:
         return 1e3 * number_in_name(file, PRESSURE_UNITS)
     except InputError:
-        statement = PRESSURE.search(file.read_bytes()[:1000].decode("utf-8", errors="replace"))
+        statement = PRESSURE.search(_head(file)[:1000])
     if statement is None:
         return None
     units = {unit.casefold(): size for unit, size in PRESSURE_UNITS.items()}
@@ -547,7 +547,7 @@ def _sizes_in_head(file: Path) -> dict[str, float]:
     sizes = {}
     for size, words in SIZES.items():
         statement = rf"(?i)(?:{words})[^\n]{{0,30}}?[\s;:=,\"]({NUMBER})[\s;,\"]*(mm|cm|in)\b"
-        statement += r"(?!\s*(?:/|per|pro))"  # no speed
+        statement += r"(?!\s*(?:/|per|pro|par))"  # no speed
         if (match := re.search(statement, _head(file))) is not None:
             sizes[size] = parse_number(match[1]) * LENGTH_UNITS[match[2]]
     return sizes
@@ -557,7 +557,8 @@ def _head(file: Path) -> str:
     """Return the beginning of a file as text, whatever its encoding."""
     with file.open("rb") as stream:
         content = stream.read(4000)
+    encoding = "utf-16" if content.startswith(UTF_16_MARKS) else "utf-8"
     try:  # the last letter may be cut
-        return codecs.getincrementaldecoder("utf-8")().decode(content)
+        return codecs.getincrementaldecoder(encoding)().decode(content)
     except UnicodeDecodeError:
         return content.decode("latin-1")

@@ -23,6 +23,9 @@ from ..light_dataclasses import dataclass
 from ..storage.reading import read_bytes
 from .units import MAX_NAME_LENGTH
 
+#: First bytes of text in UTF-16.
+UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
@@ -171,7 +174,7 @@ def _read_text(path: Path, any_encoding: bool) -> str:
         raise InputError(path, "", "no such file") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
-    is_utf_16 = any_encoding and content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    is_utf_16 = any_encoding and content.startswith(UTF_16_MARKS)
     try:
         return content.decode("utf-16" if is_utf_16 else "utf-8-sig")
     except UnicodeDecodeError:

@@ -116,15 +116,18 @@ def test_specimens_in_one_file_have_the_direction_of_its_head(tmp_path):
     assert test["files"] == {"fill": ["table.csv"]}
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
 def test_french_files_are_read(tmp_path, encoding):
     rows = [f"{t};{t / 4:.2f};{3 * t:.1f};1,5".replace(".", ",") for t in range(20)]
     names = "Temps [s];Déplacement [mm];Force [daN];Vitesse de déplacement [mm/s]"
     for number, word in enumerate(("chaîne", "trame"), 1):
-        lines = ["Essai de traction", f"Sens: {word}", names, *rows]
+        sizes = "Largeur: 50 mm", "\u00c9paisseur : 0,8 mm", "Longueur de référence: 100 mm"
+        speed = "Vitesse entre mors: 20 mm par minute"
+        lines = ["Essai de traction", f"Sens: {word}", *sizes, speed, names, *rows]
         (tmp_path / f"essai_{number}.csv").write_text("\n".join(lines), encoding)
     (test,) = proposed_tests(recognised_groups(tmp_path))
     assert test["files"] == {"warp": ["essai_1.csv"], "fill": ["essai_2.csv"]}
+    assert test["in_heads"] == {"width": 50.0, "thickness": 0.8, "gauge_length": 100.0}
     (curve,) = read_load_curves(tmp_path / "essai_1.csv", direction="chaîne", width=50.0)
     assert (curve.direction, curve.elongation[-1], curve.load[-1]) == ("warp", 4.75, 570.0)
 
