@@ -64,7 +64,7 @@ TIMES = "times of the pictures"
 SIZES = {
     "width": r"width|breite|largeur",
     "gauge_length": r"gau?ge[ _]length|messl[äa]nge|longueur de (?:r[ée]f[ée]rence|mesure)",
-    "grip_distance": r"grip[ _](?:distance|separation)|einspannl[äa]nge|entre (?:mors|m[âa]choires)",
+    "grip_distance": r"grip[ _](?:distance|separation)|einspannl[äa]nge|entre m(?:ors|[âa]choires)",
     "thickness": r"thickness|dicke|[ée]paisseur",
 }
 
