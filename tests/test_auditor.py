@@ -163,6 +163,21 @@ def test_fit_to_frames_of_a_tilted_camera_is_audited(tmp_path):
     assert "are not those of f0.csv" in seen and "registration.centre" in seen
 
 
+def test_fit_that_counts_from_a_pressure_is_audited(tmp_path):
+    askew_frames(tmp_path)
+    path = tmp_path / "project.toml"
+    text = path.read_text().replace("elements = 108", "elements = 300")
+    path.write_text(text + "[bubble.sheet]\nfrom_pressure = 30\n")
+    run = ("bubble", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
+    printed = in_process(*run, cwd=tmp_path).stdout
+    assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
+    file = tmp_path / "out" / "result.json"
+    result = json.loads(file.read_text())
+    result["tests"]["bubble"]["sheet"]["from_pressure_kPa"] = 60.0
+    file.write_text(json.dumps(result))
+    assert "from_pressure" in " ".join(findings(tmp_path / "out", tmp_path))
+
+
 def test_estimate_is_audited(tmp_path):
     constant_strips(tmp_path)
     printed = in_process("estimate", "project.toml", "--test", "two", "--json", cwd=tmp_path).stdout

@@ -219,7 +219,10 @@ class Bubble:
         for column in (*columns, "scale_mm"):
             ledger.claim_column(file, column, "consistent")
         count = len(table) // 3
-        pressures = np.repeat([own / 1000.0 for own in self.pressures], 3)
+        since = self.section.get("sheet", {}).get("from_pressure")
+        unit = PRESSURE[self.folder.project.get("units", {}).get("pressure", "kPa")]
+        recorded = [unit * p for p in self.section["pressures"]] if since else self.pressures
+        pressures = np.repeat([own / 1000.0 for own in recorded], 3)
         ledger.column(file, "direction", np.tile(list("xyz"), count), "echoed")
         if len(pressures) == len(table):
             ledger.column(file, "pressure_MPa", pressures, "consistent", rel=1e-8)
@@ -233,13 +236,12 @@ class Bubble:
         if (
             _match(self.section) == "points"
             and len(pressures) == len(table)
+            and not since
             and (not self.numbers["data"]["outside_dropped"] and not self.numbers["sheet"]["used"])
         ):
             for k, (_, own) in enumerate(self.frames):
                 self._surface(file, table.iloc[3 * k : 3 * k + 3], own, degree, columns)
-        rows = [
-            [p, *(f"{r:.5f}" for r in own)] for p, own in zip(self.pressures, told, strict=False)
-        ]
+        rows = [[p, *(f"{r:.5f}" for r in own)] for p, own in zip(recorded, told, strict=False)]
         if self.folder.page is not None and len(rows) == len(told):
             title = f"R² of polynomial surfaces of degree {degree}"
             ledger.table(title, ["pressure, kPa", "x", "y", "z"], rows, number=self._number())
@@ -348,9 +350,12 @@ class Bubble:
             needed=False,
         )
         top = float(rows[(rows["quantity"] == "dz")]["modelled"].abs().max())
+        counted = self.section.get("sheet", {}).get("from_pressure") is not None
 
         def height(match):
-            if abs(float(match[1]) - top) > 0.03 * top + 2.0 * bool(self.numbers["sheet"]["used"]):
+            off = float(match[1]) - top  # what is counted from a pressure is not all of the height
+            used = 2.0 * bool(self.numbers["sheet"]["used"])
+            if not -0.03 * top - used < off < (np.inf if counted else 0.03 * top + used):
                 ledger.find("page: bubble", f"{match[0]!r}; residuals.csv has {top:.4g} mm")
             return [match[1]]
 
