@@ -32,7 +32,6 @@ class RestartSettings:
     """Settings of the stages and restarts of a fit."""
 
     first_stage: DescentSettings = FIRST_STAGE
-    max_norm_analyses: int = 40  # of the second stage
     #: Analyses at the end of the first stages among which an unstable one shows that the optimum
     #: lies at the border of instability.
     border_analyses: int = 8
@@ -105,7 +104,6 @@ class _StartedFit:
         """Minimise e itself from a point at which the squares are level."""
         if status != LEVEL:
             return point, status
-        limit = min(limit, self.problem.analyses + SETTINGS.max_norm_analyses)
         return descend(self.problem, point, self.options.tolerance, limit, norms=True)
 
     def _restart(

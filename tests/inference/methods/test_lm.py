@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import bubblefit as bf
+import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference.descent import descend
@@ -90,3 +92,23 @@ def test_lm_reweights_blocks_to_lower_e_on_noisy_data():
     options = FitOptions("slsqp", max_analyses=fit.analyses + 80)
     polished = fit_from(fit, whole.best.unknowns, options)
     assert whole.value == pytest.approx(polished.value, rel=2e-3)
+
+
+def test_second_stage_has_all_analyses_of_the_start():
+    """The least |z0| of a prior is a kink, to which the second stage goes in many small steps."""
+    heights = [8.7, 10.93, 12.6, 13.87, 14.93, 15.94, 16.8, 17.55, 18.32, 18.96]
+    bubble = bf.Bubble.heights(
+        np.linspace(0.01, 0.1, 10),
+        heights,
+        radius=100.0,
+        elements=108,
+        symmetry="quarter",
+        sheet=bf.Sheet(modes=1, prior=0.5),
+    )
+    bounds = {"E1": [100, 2600], "G12": [1, 200]}
+    law = bf.Law("constant", symmetry="balanced", bounds=bounds, strain_range=[0.02, 0.02, 0.017])
+    fabric = bf.Fabric("apex", thickness=0.8)
+    with pytest.warns(bf.BubblefitWarning, match="G12"):
+        fit = bf.fit([bubble], law, fabric=fabric, starts=1, seed=3, jobs=1)
+    (start,) = fit.best.ranked
+    assert start.status == "converged" and 51 < start.analyses < 99
