@@ -307,7 +307,7 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
     """
     holds: list[Hold] = []
     next_starts = [*(cycle.start for cycle in cycles[1:]), len(history.load) - 1]
-    for cycle, next_start in zip(cycles, next_starts, strict=True):
+    for cycle, next_start in zip(cycles, next_starts, strict=False):  # of no cycle nothing is next
         rows = slice(cycle.start, max(next_start, cycle.end) + MIN_HOLD_ROWS)
         for start, end in _slow_rows(history, rows):
             first = cycle.start + start

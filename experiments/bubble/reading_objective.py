@@ -265,7 +265,7 @@ class ReadingObjective(Objective):
         self.divisor = np.repeat(divisors, self.sizes)
         # Series of several quantities are compared in units of their noise.
         factors = [1.0 / level for level in self.noises]
-        self.unit = "times its noise"
+        self.unit = "sigma"
         if len(pooled) == 1:
             self.unit = series[0].unit.name
             factors = [series[0].unit.size] * len(series)

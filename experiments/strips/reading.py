@@ -233,7 +233,7 @@ def measured_curves(
         direction: tuple(
             curve
             for curves in exports
-            for curve in _specimens(curves, direction, data.until_largest_load)
+            for curve in _specimens(place, curves, direction, data.until_largest_load)
         )
         for direction in in_order(directions)
     }
@@ -246,10 +246,21 @@ def _are_equal(first: LoadCurve, second: LoadCurve) -> bool:
 
 
 def _specimens(
-    curves: Sequence[LoadCurve], direction: str, until_largest_load: bool
+    place: Place, curves: Sequence[LoadCurve], direction: str, until_largest_load: bool
 ) -> Sequence[LoadCurve]:
-    """Return the curves of a direction in one file; unnamed specimens are separated."""
+    """Return the curves of a direction in one file; unnamed specimens are separated.
+
+    Raise InputError where the loads of a specimen have the sign of compression.
+    """
     specimens = [curve for curve in curves if curve.direction == direction]
+    for curve in specimens:
+        lowest, highest = np.min(curve.load), np.max(curve.load)
+        if -lowest > highest:
+            problem = (
+                f"{direction}, {curve.specimen}: the loads go from {highest:.4g} to {lowest:.4g} N,"
+                " and that of a pulled strip is above zero: reverse their sign in the file"
+            )
+            raise place.error("data", problem)
     if len(specimens) == 1:
         parts = split_at_restarts(specimens[0])
         specimens = list(parts) if len(parts) > 1 else specimens

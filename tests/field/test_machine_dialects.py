@@ -96,6 +96,12 @@ STRIPS = {
         58,
         1,
     ),
+    "rows of a clock alone": (
+        [f"{k},," if k in (20, 40) else row for k, row in enumerate(TIMED)],
+        "utf-8",
+        59,
+        1,
+    ),
     "a column twice": (
         ["Load (N),Extension (mm),Load (N)", *rows_of(LOAD, ELONGATION, LOAD)],
         "utf-8",

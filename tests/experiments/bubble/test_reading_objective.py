@@ -110,7 +110,7 @@ def test_derivatives_of_curvature_and_strain_are_those_of_differences():
 def test_series_of_several_quantities_are_compared_by_their_noise():
     model, _ = inflated()
     objective = apex_objective(model)
-    assert (objective.unit, objective.least_noise) == ("times its noise", 1.0)
+    assert (objective.unit, objective.least_noise) == ("sigma", 1.0)
     assert objective.noises == (0.01, 0.01, 1e-4, 1e-4)
     single = apex_objective(model, ["strain"])
     assert single.unit == "%" and single.least_noise == pytest.approx(0.01)

@@ -60,6 +60,14 @@ def test_history_does_not_depend_on_machine_and_units(plain_history_file, tmp_pa
     assert other.measured == "extensometer"
 
 
+def test_load_that_only_falls_has_no_hold(tmp_path):
+    fall = np.linspace(1.0, 0.0, 20)
+    columns = (np.arange(20.0), 2000 * fall, 0.03 * fall)
+    path = write_history(tmp_path / "falls.csv", ["time_s,load_N,strain"], columns)
+    history = read_history(path)
+    assert find_holds(history, find_cycles(history.load)) == []
+
+
 def test_hold_gives_creep_per_decade(tmp_path):
     time, load, strain = load_history(points=80, cycles=THREE_CYCLES[:1])
     top = int(np.argmax(load))

@@ -335,6 +335,7 @@ def test_bad_input_names_file_and_field(small_strips, tmp_path, row):
         (HEAD + "1,2\n2,3\n", ["strips[0].data, order 4", "fill", "2"]),
         (HEAD + "-1,2\n-2,3\n", ["strips[0].data, elongation", "fill"]),
         (HEAD + "1,0\n2,0\n", ["strips[0].data, load", "all 2 loads are 0 N"]),
+        (HEAD + "0,1\n1,-9\n2,-19\n", ["strips[0].data: ", "from 1 to -19 N", "their sign"]),
         ("Direction," + HEAD + "warp,1,2\n", ["f.TXT: column 'Dir", "no fill"]),
         ("", ["f.TXT: no header row"]),
     ],
