@@ -100,7 +100,7 @@ def read_bending_curves(
     source = table.source(columns, {quantity: c.unit for quantity, c in channels.items()})
     labels = [path.stem] * len(loads)
     if columns["repetition"]:
-        labels = table.table.text(columns["repetition"]).tolist()
+        labels = table.table.text(columns["repetition"])
     curves = []
     for label in dict.fromkeys(labels):
         rows = [row for row, label_of_row in enumerate(labels) if label_of_row == label]

@@ -103,7 +103,7 @@ class MachineTable:
     @property
     def names(self) -> list[str]:
         """Return the names of the columns."""
-        return [str(name) for name in self.table.cells.columns]
+        return self.table.names
 
     def error(self, column: str, problem: str) -> InputError:
         """Return an error about a column."""
@@ -111,7 +111,7 @@ class MachineTable:
 
     def specimens(self, column: str) -> list[str]:
         """Return the specimen's name in each row; InputError where a cell has none."""
-        names = list(self.table.text(column))
+        names = self.table.text(column)
         for line, name in zip(self.table.lines, names, strict=True):
             if not name:
                 field = f"line {line}, column {column!r}"

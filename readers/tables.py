@@ -7,6 +7,7 @@ steps: they find the header, the units and the block of numbers, and leave out s
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
 from ..storage.reading import read_bytes
 from .units import MAX_NAME_LENGTH
@@ -35,8 +35,10 @@ class TextTable:
     ----------
     path : Path
         File, for messages.
-    cells : DataFrame of str
-        Cells, with one column for each name of the header.
+    names : list of str
+        Names of the columns, in the header.
+    rows : sequence of list of str
+        Cells of each row, one for each name.
     lines : (rows,) array of int
         Line of each row, from 1.
     decimal : str
@@ -44,7 +46,8 @@ class TextTable:
     """
 
     path: Path
-    cells: pd.DataFrame
+    names: Cells
+    rows: Sequence[Cells]
     lines: NDArray[np.intp]
     decimal: str = "."
 
@@ -66,19 +69,19 @@ class TextTable:
         InputError
             The column is missing, or a cell holds no number.
         """
-        text = self.text(column)
-        values = _parse_column(text, self.decimal)
+        cells = self.text(column)
+        values = _parse_column(cells, self.decimal)
         is_bad = ~np.isfinite(values)
         if holes and is_bad.any():
             # Only of the rows in question: text costs more than numbers.
-            is_bad[is_bad] = ~text[is_bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
+            is_bad[is_bad] = [not is_hole(cells[row].strip()) for row in np.flatnonzero(is_bad)]
         if is_bad.any():
             raise self._no_numbers(column, np.flatnonzero(is_bad))
         return values
 
     def _no_numbers(self, column: str, rows: NDArray[np.intp]) -> InputError:
         """Return the error of a column with cells that are no numbers in these rows."""
-        cell = self.text(column).iloc[rows[0]].strip()
+        cell = self.text(column)[rows[0]].strip()
         problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
         if is_ambiguous(cell):
             problem += "; write numbers without marks of thousands"
@@ -117,26 +120,40 @@ class TextTable:
             problem = "expected a date before each time, of day, month and year"
             raise InputError(self.path, f"column {column!r}", problem) from None
 
-    def text(self, column: str) -> pd.Series:
+    def text(self, column: str) -> Cells:
         """Return one column as it stands in the file; InputError if it is not there once."""
-        check_name(self.path, [str(name) for name in self.cells.columns], column)
-        return self.cells[column]
+        check_name(self.path, self.names, column)
+        index = self.names.index(column)
+        return [row[index] for row in self.rows]
 
 
-def _parse_column(text: pd.Series, decimal: str) -> NDArray[np.float64]:
+def _parse_column(cells: Cells, decimal: str) -> NDArray[np.float64]:
     """Return the numbers of a column, NaN for cells without one."""
-    plain = text
+    plain = cells
     if decimal != ".":
         # A point beside decimal commas marks thousands, or a mistake: no number either way.
-        plain = text.str.replace(".", "?", regex=False).str.replace(decimal, ".", regex=False)
-    values = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
+        plain = [cell.replace(".", "?").replace(decimal, ".") for cell in cells]
+    values = _plain_numbers(plain)
     if np.isfinite(values).all():
         return values
-    cells = [cell.strip() for cell in text]
+    cells = [cell.strip() for cell in cells]
     if not marks_thousands(cells, decimal):
         return values
-    plain = pd.Series([without_thousands(cell, decimal) for cell in cells])
-    return pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
+    return _plain_numbers([without_thousands(cell, decimal) for cell in cells])
+
+
+def _plain_numbers(cells: Cells) -> NDArray[np.float64]:
+    """Return numbers with a decimal point, NaN for cells without one."""
+    return np.fromiter(map(_plain_number, cells), float, len(cells))
+
+
+def _plain_number(cell: str) -> float:
+    if not cell.isascii() or "_" in cell:  # Python takes 1_000 and the digits of any script
+        return math.nan
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
 
 
 def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> Lines:
@@ -199,7 +216,7 @@ def read_table(path: Path) -> TextTable:
         rows.append(padded(row.cells, width))
     check_width(path, lines[0][0], width, len(lines), sum(len(text) for _, text in lines))
     numbers = np.array([number for number, _ in lines[1:]])
-    return TextTable(path, pd.DataFrame(rows, columns=header, dtype=str), numbers)
+    return TextTable(path, header, rows, numbers)
 
 
 def _split_strictly(path: Path, number: int, text: str) -> Row:

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..lazy_modules import pandas as pd
 from .frames import (
     BELOW_POINTS,
     FLAGGED,
@@ -518,7 +517,7 @@ class _CellTable:
                 raise InputError(path, f"line {number}", problem)
             check_row(path, Row(number, cells), width, layout.separator, "the header")
             rows.append(padded(cells, width))
-        self.cells = pd.DataFrame(rows, dtype=str)
+        self.rows = rows
         self.lines = np.array([number for number, _ in layout.body])
 
     def numbers(self, index: int, mask: NDArray[np.bool_], holes: bool) -> Array:
@@ -534,13 +533,14 @@ class _CellTable:
             Whether cells may be empty, which gives NaN.
         """
         name = self.layout.headings[index].name
-        column = self.cells[[index]][mask].set_axis([name], axis=1)
-        table = TextTable(self.path, column, self.lines[mask], self.layout.decimal)
+        column = [self.rows[row][index : index + 1] for row in np.flatnonzero(mask)]
+        table = TextTable(self.path, [name], column, self.lines[mask], self.layout.decimal)
         return table.numbers(name, holes)
 
     def flag(self, index: int) -> Array:
         """Return the flags in a column, words or numbers."""
-        values = np.asarray(self.cells[index].str.casefold().map(FLAG_WORDS), dtype=float)
+        words = (row[index].casefold() for row in self.rows)
+        values = np.array([FLAG_WORDS.get(word, np.nan) for word in words], dtype=float)
         if not np.isnan(values).any():
             return values
         return self.numbers(index, np.ones(len(self.lines), dtype=bool), holes=False)

@@ -118,6 +118,7 @@ FIRST_USED = {"pandas", "PIL.Image", "numba"} | {
 
 KNOWN = "examples/bubble-known-solution/project.toml"
 BEND = "examples/bend-valmex7318/project.toml"
+STRIPS = "examples/uniaxial-valmex7318/project.toml"
 
 
 @pytest.mark.parametrize(
@@ -135,6 +136,8 @@ BEND = "examples/bend-valmex7318/project.toml"
           "bubblefit.materials.exports"}),
         (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{BEND}')",
          {"scipy.sparse", "numba", "bubblefit.solvers.membrane.solver"}),
+        (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{STRIPS}')",
+         {"pandas", "scipy.sparse", "numba"}),
         ("import bubblefit.cli.check", {"numpy", "pydantic", "rich", "bubblefit.project"}),
         ("import bubblefit.cli.export", {"rich", "bubblefit.solvers.registry"}),
         ("import bubblefit.cli.start", {"rich", "jinja2", "numpy", "pydantic"}),

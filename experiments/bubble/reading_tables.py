@@ -379,7 +379,7 @@ def _contents(
     if name == "specimen":
         return table.specimens(column), None
     if name == "axis":
-        return table.table.text(column).to_numpy(), None
+        return table.table.text(column), None
     units, unit_key = CHANNELS[name.partition(" ")[0].partition("_")[0]]
     if isinstance(section, ApexSection) and units is CURVATURE_UNITS:
         _check_unit_of_curvature(table, column, section)

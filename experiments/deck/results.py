@@ -306,9 +306,9 @@ class Probe:
         """
         table = read_table(results.paths[0])
         values = self.scale * table.numbers(str(self.place))
-        text = table.text(str(self.place)).str.replace(r"[eE].*|\D|^[-0.]+", "", regex=True)
-        digits = min(int(text.str.len().max()), DOUBLE_DIGITS)
-        rounding = last_digit(float(np.abs(values).max()), digits)
+        cells = table.text(str(self.place))
+        digits = max(len(re.sub(r"[eE].*|\D|^[-0.]+", "", cell)) for cell in cells)
+        rounding = last_digit(float(np.abs(values).max()), min(digits, DOUBLE_DIGITS))
         return np.arange(len(values), dtype=float), values, rounding
 
 

@@ -24,12 +24,12 @@ def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
     gauge_lengths = table.numbers("gauge_length_mm").tolist()
     final_lengths = table.numbers("final_length_mm").tolist()
     scatter = np.full(len(table.lines), np.nan)
-    if "data_scatter_N" in table.cells.columns:
+    if "data_scatter_N" in table.names:
         scatter = table.numbers("data_scatter_N")
     polynomials: dict[str, PublishedPolynomial] = {}
     for row, line in enumerate(table.lines):
         field = f"line {line}, column 'direction'"
-        direction = direction_named(str(table.text("direction").iloc[row]), path, field)
+        direction = direction_named(table.text("direction")[row], path, field)
         if direction in polynomials:
             raise InputError(path, field, f"{direction} is given twice; expected once")
         gauge = gauge_lengths[row]
@@ -45,8 +45,7 @@ def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
 
 def _coefficients(table: TextTable) -> NDArray[np.float64]:
     """Return the coefficients (rows, order + 1) in columns c1, c2 ..., and c0 where it is there."""
-    names = [str(name) for name in table.cells.columns]
-    powers = {int(name[1:]) for name in names if re.fullmatch(r"c\d{1,2}", name)}
+    powers = {int(name[1:]) for name in table.names if re.fullmatch(r"c\d{1,2}", name)}
     order = max(powers | {1})
     coefficients = np.zeros((len(table.lines), order + 1))
     for power in range(0 if 0 in powers else 1, order + 1):

@@ -54,10 +54,14 @@ def test_cells_that_are_no_numbers_are_refused(tmp_path):
     long = read_table(written_table(tmp_path, f"a\n{'y' * 60}\n5\nz\n"))
     assert complaint(long.numbers, "a").endswith(f"found '{'y' * 40}'; so in 1 more row")
     read = read_table(written_table(tmp_path, "name,load\nNA,1\nnull,2\n,3\n nan ,4\n5\n"))
-    assert read.text("name").tolist() == ["NA", "null", "", " nan ", "5"]
+    assert read.text("name") == ["NA", "null", "", " nan ", "5"]
     assert read.lines.tolist() == [2, 3, 4, 5, 6]
     assert read.numbers("load", holes=True)[:4].tolist() == [1, 2, 3, 4]
     assert "line 2, column 'name': expected a number, found 'NA'" in complaint(read.numbers, "name")
+    # Python reads the first two.
+    for cell in ("1_000", "\N{ARABIC-INDIC DIGIT ONE}2", "0x1A", "1,5"):
+        said = complaint(read_table(written_table(tmp_path, f'a\n2\n"{cell}"\n')).numbers, "a")
+        assert f"line 3, column 'a': expected a number, found {cell!r}" in said
 
 
 PATH = Path("a.csv")

@@ -10,7 +10,6 @@ channel Force kN
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from bubblefit.errors import InputError
 from bubblefit.readers.machine_tables import MachineTable, TableOptions
 from bubblefit.readers.registry import Format
@@ -37,9 +36,10 @@ def read(path: Path, options: TableOptions) -> MachineTable:
         if len(cells) != len(names):
             problem = f"expected {len(names)} numbers, found {len(cells)}"
             raise InputError(path, f"line {n}", problem)
-    table = pd.DataFrame([cells for _, cells in rows], columns=names, dtype=str)
+    line_numbers = np.array([n for n, _ in rows])
     units = {words[1]: words[2] for _, words in channels}
-    return MachineTable(TextTable(path, table, np.array([n for n, _ in rows])), units, header)
+    table = TextTable(path, names, [cells for _, cells in rows], line_numbers)
+    return MachineTable(table, units, header)
 
 
 RIGLOG = Format("riglog", "machine table", "log files of the rig", read, recognises)

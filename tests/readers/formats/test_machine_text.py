@@ -39,7 +39,7 @@ def test_table_of_an_export_is_read_in_its_units(tmp_path):
     table = read(path, OPTIONS)
     assert table.names == ["Extension (mm)", "Load (kN)"]
     assert table.units == {"Extension (mm)": "mm", "Load (kN)": "kN"} and table.header == 2
-    assert table.table.cells["Load (kN)"].tolist() == ["0", "0.2"]
+    assert table.table.text("Load (kN)") == ["0", "0.2"]
 
 
 def test_export_without_names_lists_the_row_above_its_numbers(tmp_path):
