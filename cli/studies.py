@@ -297,7 +297,8 @@ def _noise(text: str) -> tuple[str, float]:
     "forms",
     multiple=True,
     metavar="NAME",
-    help="Form of the moduli, spline:8 with its number of knots; several [all].",
+    help="Form of the moduli, spline:8 with its number of knots; several [all whose settings "
+    "the project has].",
 )
 @click.option(
     "--folds", type=click.IntRange(min=2), default=5, show_default=True, help="Of the validation."

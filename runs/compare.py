@@ -39,6 +39,8 @@ FOLD = NoteKind("fold without an error")
 VALIDATION = "validation.json"
 #: Relative excess over the least cross-validated error up to which a simpler form is as good.
 AS_GOOD = 0.05
+#: Settings of forms that follow from others: six knots, breaks from the tests' data.
+USUAL_SETTINGS = ("knots", "breaks")
 #: Number of random starts of the fit of each form.
 STARTS = 5
 NOT_JUDGED = "no fit without its points ended well, or no analysis at them: the form is not judged"
@@ -52,7 +54,7 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
     project : Project
     names : sequence of str
         Names of forms; "spline:8" is a spline of eight knots for each modulus. By default all that
-        the project's solver carries.
+        the project's solver carries and that need no setting which the project lacks.
 
     Returns
     -------
@@ -70,10 +72,13 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
         raise InputError(project.path, "law.bounds", problem)
     if not names:
         carries_ratios = carries_load_ratios(make_solver(project))
+        known_settings = {*USUAL_SETTINGS, *(project.law.model_extra or {})}
         names = [
             name
             for name in form_names()
-            if name != "none" and (carries_ratios or not of_load_ratio(name))
+            if name != "none"
+            and (carries_ratios or not of_load_ratio(name))
+            and known_settings.issuperset(form_settings(name))
         ]
     projects: dict[str, Project] = {}
     for name in names:

@@ -15,12 +15,15 @@ from bubblefit.materials.forms.base import LawForm, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.plugins import names_with_plug_ins, plug_in_named
+from bubblefit.project.project import read_project
 from bubblefit.readers.curves import read_load_curves
 from bubblefit.readers.registry import format_names, format_of
+from bubblefit.runs.compare import candidates
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
 from .builders.plug_ins import install_by_pip, install_plug_in
+from .builders.projects import constant_strips
 from .support.commands import output_of
 from .support.paths import ROOT
 from .support.refusals import complaint
@@ -226,6 +229,13 @@ def test_settings_of_law_are_checked(here):
     assert complaint(form_named, "saturating", {}, ENDS).startswith("scale: ")
     wrong = {"scale": {**SCALE, "fill": -1.0}}
     assert "scale.fill: " in complaint(form_named, "saturating", wrong, ENDS)
+
+
+def test_form_without_its_settings_is_left_out_of_a_comparison(here, tmp_path):
+    project = read_project(constant_strips(tmp_path))
+    forms = candidates(project)
+    assert {"trilinear", "spline:6"} <= forms.keys() and "saturating" not in forms
+    assert "saturating" in candidates(project.with_law("saturating", {"scale": SCALE}))
 
 
 @pytest.mark.parametrize("direction", ["warp", "fill"])
