@@ -88,7 +88,7 @@ def write_study(study: Any, folder: Path) -> Path:
     if isinstance(study, LawComparison):  # what each test draws is written there
         page, tables, figures, digits = _comparison(study, folder)
     else:
-        page, tables, figures, digits = CONTENT[type(study)](study)
+        page, tables, figures, digits = CONTENT.get(type(study), _table_alone)(study)
     (folder / RESULT).unlink(missing_ok=True)  # a folder that is half written has no result
     for name, table in tables.items():
         write_table(table, folder / name, digits)
@@ -378,7 +378,18 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     )
 
 
-#: Functions that return the content of a study's folder, by the type of its result.
+def _table_alone(study: Any) -> Content:
+    """Return the page of a study without a function of its own: its table and no chart."""
+    command = str(study.numbers["command"])
+    table = study.table()
+    text = [k for k, dtype in enumerate(table.dtypes) if dtype.kind not in "iuf"]
+    values = Table("Values", [*table], table.to_numpy(object).tolist(), text=text)
+    title = f"{study.project.title}: {command}"
+    return designed(study, title, command.rpartition(" ")[2], [], [values])
+
+
+#: Functions that return the content of a study's folder, by the type of its result; a study that
+#: is not listed has a page with its table.
 CONTENT: Mapping[type, Callable[[Any], Content]] = {
     bootstrap.Bootstrap: _bootstrap,
     LawComparison: _comparison,

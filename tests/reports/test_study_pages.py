@@ -1,13 +1,18 @@
 """Charts of studies: laws, profiles, nu12; every value in its place, thresholds, gaps."""
 
+import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.experiments.forward import Simulation
+from bubblefit.notes import Verdict
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Chart, Charts, axis_ends
 from bubblefit.reports.content import Table
+from bubblefit.runs.folder import Presented
 from bubblefit.runs.profile import Target
 from bubblefit.runs.refinement import ratios
 
@@ -114,3 +119,28 @@ def test_ratios_are_drawn_over_nu12():
     assert [(s.lower, s.upper) for s in first.series[1:4:2]] == [([90], [110]), ([57], [63])]
     assert first.series[1].x == [1.0] and [s.y for s in shear.series] == 3 * [[0.01, 0.02, 0.03]]
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
+
+
+class Thicknesses(Presented):
+    """A study that `study_pages.CONTENT` does not list."""
+
+    project = SimpleNamespace(title="Made", fabric=SimpleNamespace(lab="", thickness=0.8))
+    notes, numbers = (), {"command": "study thickness"}
+    verdict = Verdict("usable", "the load follows the thickness")
+
+    def table(self):
+        return pd.DataFrame({"thickness_mm": [0.5, 1.0], "load_N": [8.0, 16.0], "model": "warp"})
+
+    def result_lines(self):
+        return []
+
+
+def test_page_of_study_without_its_own_shows_its_table(tmp_path):
+    page = Thicknesses().report(tmp_path / "out").read_text()
+    assert "Made: study thickness" in page and "the load follows the thickness" in page
+    assert re.search(r"thickness_mm.*load_N.*model.*0\.5.*8.*warp.*1.*16.*warp", page, re.DOTALL)
+    written = pd.read_csv(tmp_path / "out" / "thickness.csv")
+    pd.testing.assert_frame_equal(written, Thicknesses().table())
+    assert (
+        json.loads((tmp_path / "out" / "result.json").read_text())["command"] == "study thickness"
+    )
