@@ -337,6 +337,8 @@ StrainUnit = Literal["%", "‰", "mm/mm"]
 YARNS = ("warp", "fill")
 #: Largest fall of a load from row to row, as a share of the largest, over which tables are paired.
 LARGEST_FALL = 0.02
+#: Largest load of a yarn that carries none, as a share of that of the other.
+LARGEST_OF_UNLOADED = 0.02
 #: Quantities that a table has to hold, by the key with which a project names their column.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
@@ -412,7 +414,8 @@ def pair_over_load(warp: BiaxialTable, fill: BiaxialTable) -> BiaxialTable:
     """Return one table of two that hold the readings along one yarn each, at other points.
 
     At a load ratio both loads rise together, so that readings at equal shares of the largest loads
-    belong together. The readings are those along the warp; those along the fill are interpolated.
+    belong together; where a yarn carries none, those at equal times. The readings are those along
+    the warp; those along the fill are interpolated.
 
     Parameters
     ----------
@@ -422,28 +425,51 @@ def pair_over_load(warp: BiaxialTable, fill: BiaxialTable) -> BiaxialTable:
     Raises
     ------
     InputError
-        A load falls: it is not said which reading belongs to which.
+        A load falls, or there is none and no time: it is not said which readings belong together.
     """
-    shares = [table.load[:, 0] / table.load.max() for table in (warp, fill)]
-    for table, share in zip((warp, fill), shares, strict=True):
-        if np.diff(share).min(initial=0.0) < -LARGEST_FALL:
-            problem = "the load falls, and the two directions are paired over it: keep one loading"
-            raise InputError(table.path, "load", problem)
-    warp_share, fill_share = shares
-    # Below its first reading the fill is not extrapolated.
-    is_paired = warp_share >= fill_share[0]
-    share = warp_share[is_paired]
-    fill_strain = np.interp(share, np.maximum.accumulate(fill_share), fill.strain[:, 0])
-    words = f"{warp.name}: paired with {fill.name} at equal shares of the largest loads"
+    tables = warp, fill
+    largest = [float(table.load.max()) for table in tables]
+    if min(largest) > LARGEST_OF_UNLOADED * max(largest):
+        warp_place, fill_place = map(_shares_of_load, tables)
+        words = "at equal shares of the largest loads"
+    else:
+        warp_place, fill_place = _times_of(tables[int(np.argmin(largest))], tables)
+        words = "at equal times, as one direction carries no load"
+    # Beyond its readings the fill is not extrapolated.
+    is_paired = (warp_place >= fill_place[0]) & (warp_place <= fill_place[-1])
+    place = warp_place[is_paired]
+    fill_load, fill_strain = (
+        np.interp(place, fill_place, values[:, 0]) for values in (fill.load, fill.strain)
+    )
+    words = f"{warp.name}: paired with {fill.name} {words}"
     return replace(
         warp,
-        load=np.column_stack([warp.load[is_paired, 0], share * fill.load.max()]),
+        load=np.column_stack([warp.load[is_paired, 0], fill_load]),
         strain=np.column_stack([warp.strain[is_paired, 0], fill_strain]),
         lines=warp.lines[is_paired],
         source=replace(warp.source, notes=(*warp.source.notes, words)),
         time=None,
         partner=fill,
     )
+
+
+def _shares_of_load(table: BiaxialTable) -> Array:
+    """Return the loads (n,) of one yarn over the largest; raise InputError if they fall."""
+    shares = table.load[:, 0] / table.load.max()
+    if np.diff(shares).min(initial=0.0) < -LARGEST_FALL:
+        problem = "the load falls, and the two directions are paired over it: keep one loading"
+        raise InputError(table.path, "load", problem)
+    return np.asarray(np.maximum.accumulate(shares))
+
+
+def _times_of(unloaded: BiaxialTable, tables: Sequence[BiaxialTable]) -> list[Array]:
+    """Return the times (n,), s, of each table; raise InputError if one has none."""
+    times = [table.time for table in tables if table.time is not None]
+    if len(times) < len(tables):
+        problem = "carries no load over which the two directions could be paired: give both a "
+        problem += "column of time, or put both directions into one file (data.files)"
+        raise InputError(unloaded.path, "load", problem)
+    return times
 
 
 def _load_units(

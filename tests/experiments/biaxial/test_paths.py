@@ -1,5 +1,7 @@
 """experiments/biaxial/paths.py: load ratios and cycles, and files of biaxial tests."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.paths import (
@@ -168,11 +170,16 @@ def test_missing_units_and_ratios_of_a_biaxial_file_are_asked_for(tmp_path):
     complaint_with(["line 2", "'ratio'", "2:1", "12:30 h"], read_biaxial_table, wrong)
 
 
-def one_yarn(folder, yarn, load, strain):
+def one_yarn(folder, yarn, load, strain, time=None):
     """The table of a file with the readings along one yarn: kPa on 1 mm, and strains."""
     path = folder / f"{yarn}.csv"
-    rows = [f"{e!r},{n!r}" for e, n in zip(strain.tolist(), load.tolist(), strict=True)]
-    path.write_text("\n".join(["Strain,Stress", *rows]))
+    heading = "Strain,Stress"
+    columns = [strain, load]
+    if time is not None:
+        heading += ",Time (s)"
+        columns.append(time)
+    rows = [",".join(map(repr, row)) for row in np.column_stack(columns).tolist()]
+    path.write_text("\n".join([heading, *rows]))
     columns = {f"{yarn}_load": "Stress", f"{yarn}_strain": "Strain"}
     options = {"columns": columns, "load_unit": "N/m", "strain_unit": "mm/mm", "yarns": [yarn]}
     return read_biaxial_table(path, **options)
@@ -191,6 +198,25 @@ def test_directions_sampled_at_other_points_are_paired_over_the_load(tmp_path):
     # Readings below the first of the other direction have no partner.
     late = one_yarn(tmp_path, "fill", loads[1][100:], 0.1 * np.sqrt(loads[1][100:] / 50))
     assert len(pair_over_load(warp, late).load) == 5
+
+
+@pytest.mark.parametrize("loaded", ["warp", "fill"])
+def test_direction_without_load_is_paired_over_the_time(tmp_path, loaded):
+    times = {"warp": np.linspace(0.0, 20.0, 21), "fill": np.linspace(0.5, 22.0, 44)}
+    noise = np.random.default_rng(3)
+    tables = {}
+    for yarn, time in times.items():
+        load = 5.0 * time if yarn == loaded else noise.normal(0.1, 0.05, len(time))
+        strain = (1e-3 if yarn == loaded else -4e-4) * time
+        tables[yarn] = one_yarn(tmp_path, yarn, load, strain, time)
+    both = pair_over_load(**tables)
+    share = np.array([1e-3, -4e-4] if loaded == "warp" else [-4e-4, 1e-3])
+    np.testing.assert_allclose(both.strain, times["warp"][1:, None] * share)
+    assert find_cycles(both.load)[0].ratio == ("1:0" if loaded == "warp" else "0:1")
+    assert "at equal times" in both.source.notes[-1]
+    tables["warp"] = replace(tables["warp"], time=None)
+    unloaded = {"warp": "fill.csv", "fill": "warp.csv"}[loaded]
+    complaint_with([unloaded, "carries no load", "column of time"], pair_over_load, **tables)
 
 
 def test_directions_whose_load_falls_are_not_paired(tmp_path):
