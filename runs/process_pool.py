@@ -146,13 +146,14 @@ class ProcessPool:
         """Queue the task of a dead worker again; raises WorkersLost at the last try."""
         self.deaths[number] += 1
         words = f"a worker process died (exit code {exit_code}; out of memory?)"
+        words += f" at task {number} of the {self.name}"
         if self.deaths[number] < MAX_TRIES:
-            announce(f"{words}; what it did is done again")
+            announce(f"{words}, which is done again")
             self.waiting.appendleft(number)
             return
         raise WorkersLost(
-            f"{words}, as did the one before it at the same task; finished {self.name} are kept: "
-            "go on with --resume, perhaps with fewer --jobs"
+            f"{words}, as did the one before it; finished {self.name} are kept: go on with "
+            "--resume, perhaps with fewer --jobs"
         )
 
     def end(self) -> None:

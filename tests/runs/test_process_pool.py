@@ -84,8 +84,9 @@ def test_jobs_and_their_order_do_not_change_a_start():
 
 
 def test_death_of_a_process_is_noticed():
-    with pytest.raises(BubblefitError, match="--resume") as caught:
-        list(run_tasks(lambda: lambda number, tell: os._exit(9), [0, 1], 2))
+    words = r"died \(exit code 9; out of memory\?\) at task 5 of the starts, as .* with --resume"
+    with pytest.raises(BubblefitError, match=words) as caught:
+        list(run_tasks(lambda: lambda number, tell: os._exit(9), [5], 2))
     assert caught.value.exit_code == 4
 
 
