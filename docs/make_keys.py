@@ -1,7 +1,7 @@
-"""Write project/keys.pyi: types of the keyword arguments of tests, laws and fits in Python.
+"""Write what is made from the sections of the project file, for editors and type checkers.
 
-Editors complete from them, and type checkers see a misspelt one. They are made from the sections of
-the project file.
+project/keys.pyi has the types of the keyword arguments of tests, laws and fits in Python, and
+templates/project/project.schema.json is the schema of the project file.
 
 python docs/make_keys.py
 """
@@ -14,10 +14,11 @@ import typing
 from pathlib import Path
 from typing import Any
 
+from bubblefit.cli.start import SHIPPED
 from bubblefit.experiments.registry import kind_named
 from bubblefit.materials.forms.base import form_names, form_settings
 from bubblefit.project import objects
-from bubblefit.project.schema import FitSection, LawSection
+from bubblefit.project.schema import FitSection, LawSection, schema_text
 from bubblefit.readers.sections import model_of
 from pydantic import BaseModel
 
@@ -126,4 +127,5 @@ def text() -> str:
 
 if __name__ == "__main__":
     KEYS.write_text(text(), encoding="utf-8")
+    SHIPPED.write_text(schema_text(with_plug_ins=False), encoding="utf-8")
     subprocess.run(["ruff", "format", "--quiet", str(KEYS)], check=True)

@@ -79,4 +79,5 @@ def test_card_of_fit_is_used_where_project_has_none(tmp_path, monkeypatch):
 
 
 def test_shipped_schema_is_that_of_sections():
+    """If not: python docs/make_keys.py."""
     assert SHIPPED.read_text() == schema_text(with_plug_ins=False)
