@@ -679,27 +679,41 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
 
 
 def information_of(
-    comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
+    comparison: Comparison,
+    law: HypoelasticLaw,
+    unknowns: Unknowns,
+    best: Array | None = None,
 ) -> tuple[Array, History]:
-    """Run a comparison with a law, and return its Fisher information on the unknowns of the law.
+    """Run a comparison with a law, and return its Fisher information on what tests share.
+
+    These are the unknowns of the law, then those of all tests, such as an unknown thickness.
 
     Parameters
     ----------
     comparison : Comparison
     law : HypoelasticLaw
     unknowns : Unknowns
+    best : (unknowns,) array, optional
+        Values of the unknowns of all tests; by default they are at their start.
 
     Returns
     -------
-    (size, size) array
+    (shared, shared) array
         The information.
     History
         The run.
     """
-    at_zero = {n.name: 0.0 for n in comparison.nuisance}
-    history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
-    slope = slope * comparison.objective.scale[:, None]
     size = unknowns.size
-    by_unknowns = np.hstack([slope[:, :size] @ unknowns.to_coefficients, slope[:, size:]])
-    noise = comparison.objective.least_noise
-    return information(by_unknowns, noise, comparison.nuisance), history
+    names = [nuisance.name for nuisance in unknowns.nuisance.shared]
+    values = {nuisance.name: nuisance.start for nuisance in comparison.nuisance}
+    if best is not None:
+        shared = zip(names, best[size:].tolist(), strict=False)
+        values |= {name: value for name, value in shared if name in values}
+    history, slope = comparison.differentiate(law, unknowns.free, values, warm=False)
+    slope = slope * comparison.objective.scale[:, None]
+    columns = dict(zip(values, slope.T[size:], strict=True))
+    by_shared = [columns.pop(name, np.zeros(len(slope))) for name in names]
+    by_law = slope[:, :size] @ unknowns.to_coefficients
+    separate = [nuisance for nuisance in comparison.nuisance if nuisance.name in columns]
+    by_unknowns = np.column_stack([by_law, *by_shared, *columns.values()])
+    return information(by_unknowns, comparison.objective.least_noise, separate), history

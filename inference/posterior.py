@@ -95,9 +95,9 @@ class Posterior:
         Parameters
         ----------
         information : (size, size) array
-            Fisher information of those data on the unknowns of the law.
+            Fisher information of those data on as many unknowns, from the first.
         """
-        size = self.unknowns.size
+        size = len(information)
         count = self.unknowns.count
         values, axes = np.linalg.eigh(information)
         slopes = np.zeros((count, size))

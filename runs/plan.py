@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arguments import Positive, checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
-from ..experiments.base import Candidate, MakeSolver, Plannable, Planning, Precision, Weighting
+from ..experiments.base import Candidate, Plannable, Planning, Precision, Weighting
 from ..experiments.forward import (
     BEYOND_LAW,
     by_strain,
@@ -24,9 +24,9 @@ from ..experiments.forward import (
 from ..experiments.registry import kinds
 from ..experiments.sections import Place
 from ..inference.linear import information_of
+from ..inference.nuisance import Nuisance
 from ..inference.posterior import Posterior
 from ..inference.reported import POINTS, UNKNOWN, ReportedModulus, reported_moduli, sigma_words
-from ..inference.unknowns import Unknowns
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
@@ -36,8 +36,10 @@ from ..notes import Note, State, Verdict
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
+from .law_setup import shared_unknowns
 from .optimum import CardOptimum, find_optimum
 from .progress import Listener, listener
+from .setup import with_shared
 from .simulation import FAILED, card_of, card_words, check_has_law
 
 #: The ranking by the least certain of the three moduli.
@@ -274,7 +276,7 @@ class Query:
     ends: Array
 
     def moduli(self, information: Array | None = None) -> dict[str, ReportedModulus]:
-        """Return the moduli by label, as reported with further (size, size) information."""
+        """Return the moduli by label, as reported with further information."""
         posterior = self.posterior
         if information is not None:
             posterior = posterior.with_information(information)
@@ -422,7 +424,7 @@ def _offers(
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """A candidate test, with the (size, size) information matrix of all its specimens."""
+    """A candidate test, with the information matrix of all its specimens, see `information_of`."""
 
     prospect: Prospect
     information: Array
@@ -441,15 +443,13 @@ def _additions(
     on_event: Callable[[int, int, str], None],
 ) -> list[Addition]:
     """Return the candidates that can be computed; add notes on all others to `notes`."""
-    law = optimum.best.law
-    unknowns = optimum.problem.unknowns
     additions = []
     for number, (kind, candidate) in enumerate(offers):
         on_event(number, len(offers), candidate.name)
         count = candidate.specimens if specimens is None else specimens
         try:
             information, noise, candidate_notes = _information(
-                candidate, unknowns, law, optimum.setup.make_leading
+                candidate, optimum, shared_unknowns(optimum.setup.project)
             )
         except (SolverFailure, InputError) as error:
             words = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
@@ -462,15 +462,22 @@ def _additions(
 
 
 def _information(
-    candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make_solver: MakeSolver
+    candidate: Candidate, optimum: CardOptimum, shared: Sequence[Nuisance]
 ) -> tuple[Array, str, list[Note]]:
-    """Return the information matrix of one specimen, its noise in words, and notes."""
+    """Return the information matrix of one specimen, its noise in words, and notes.
+
+    `shared` are the unknowns of all tests, of which a candidate is one more.
+    """
     notes = []
-    information = np.zeros((unknowns.size, unknowns.size))
     noises = []
-    for comparison in candidate.make().comparisons(make_solver, Weighting()):
-        comparison_information, history = information_of(comparison, law, unknowns)
-        information += comparison_information
+    law = optimum.best.law
+    matrices = []
+    comparisons = candidate.make().comparisons(optimum.setup.make_leading, Weighting())
+    for comparison in with_shared(comparisons, shared):
+        matrix, history = information_of(
+            comparison, law, optimum.problem.unknowns, optimum.best.point.unknowns
+        )
+        matrices.append(matrix)
         objective = comparison.objective
         count = round(np.mean(objective.sizes))
         noises.append(f"{objective.least_noise:.3g} {objective.unit} at {count} values")
@@ -479,4 +486,4 @@ def _information(
         if comparison.must_be_stable:
             remarks += unstable_words(history.unstable)
         notes += [note.about(candidate.name) for note in remarks]
-    return information, f"{'; '.join(noises)} ({candidate.noise_is})", notes
+    return np.sum(matrices, axis=0), f"{'; '.join(noises)} ({candidate.noise_is})", notes

@@ -20,6 +20,7 @@ from bubblefit.runs.simulation import FAILED
 from ..builders.closed_forms import CARD, STRAIN
 from ..builders.laws import TABLE_4_2
 from ..builders.projects import STRIP_MODULI, known_bubble
+from ..builders.unknowns import project as project_with_unknowns
 
 # Packages of kinds have functions of the same names.
 bubbles = import_module("bubblefit.experiments.bubble.planning")
@@ -98,6 +99,14 @@ def test_information_of_strips_is_closed_form(project, few, monkeypatch):
     again = plan(project, CARD, strain=PLANNED_ENDS, rank="E1").following
     assert again.name == "warp strip" and again.specimens == 3
     assert again.summary["E1"] == pytest.approx((before + 2 * added) ** -0.5, rel=2e-3)
+
+
+def test_unknown_of_all_tests_limits_what_a_further_test_says(tmp_path, few):
+    unknown = project_with_unknowns(tmp_path, "thickness.prior = 0.04")  # 5 % of 0.8 mm
+    made = plan(unknown, CARD, strain=PLANNED_ENDS)
+    for planned in made.candidates:
+        assert min(planned.summary.values()) > 0.0499
+    assert named(made)["biaxial 2:1"].summary["E1"] == pytest.approx(0.05, rel=0.01)
 
 
 KNOWN = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.1, 0.1, 0.08])
