@@ -91,17 +91,13 @@ def held_out(
         That of the fit of the law; by default that of the fabric.
     """
     name = name or prepared.test.name
-    comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
-    comparisons = _with_thickness(comparisons, thickness)
+    of_fabric = prepared.comparisons(make_solver, Weighting(relative=True), part)
+    comparisons = _with_thickness(of_fabric, thickness)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
     status = ""
-    if nuisance is None and parameters is not None:
-        fitted_names = {name for values in parameters.values() for name in values}
-        unknowns = [n for comparison in comparisons for n in comparison.nuisance]
-        # Parameters of decks (`drawn`) are those of the material; offsets are of each test.
-        if unknowns and all(n.drawn and n.name in fitted_names for n in unknowns):
-            nuisance = parameters
+    if nuisance is None and parameters is not None and _decides(parameters, comparisons):
+        nuisance = parameters
     if nuisance is None:
         point, status = fit_nuisance(problem, y)
     else:
@@ -118,8 +114,16 @@ def held_out(
     findings = presenter_of(prepared.test.kind).findings(
         prepared, fitted_test(prepared, law, make_solver, problem, point, thickness)
     )
-    words = findings.quality, findings.numbers
-    return HeldOut(name, error, rms, units, notes, *words, problem.analyses)
+    quality = findings.quality, findings.numbers
+    return HeldOut(name, error, rms, units, notes, *quality, problem.analyses)
+
+
+def _decides(parameters: NuisanceValues, comparisons: Sequence[Comparison]) -> bool:
+    """Return whether all nuisance unknowns are parameters of decks that another fit has."""
+    fitted_names = {name for values in parameters.values() for name in values}
+    unknowns = [n for comparison in comparisons for n in comparison.nuisance]
+    # Parameters of decks (`drawn`) are those of the material; offsets are of each test.
+    return bool(unknowns) and all(n.drawn and n.name in fitted_names for n in unknowns)
 
 
 def _with_thickness(

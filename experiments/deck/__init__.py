@@ -319,16 +319,7 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
     for key, name_of_file in named:
         if not is_file(template.parent / name_of_file):
             raise place.error(key, missing_file_reason(template.parent / name_of_file))
-    matched: dict[str, Compared] = {}
-    for number, compare in enumerate(section.compare):
-        at = f"compare[{number}]"
-        compared = _read_compared(compare, place, at, section.folder)
-        if not compare.weight:
-            continue
-        if matched.setdefault(compared.name, compared) is not compared:
-            raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
-    if not matched:
-        raise place.error("compare", "expected a weight above 0: nothing would be matched")
+    matched = _matched(section, place)
     parameters = _unknowns(section, place)
     condition = str(section.parameters.get(FEASIBLE, ""))
     values = {parameter.name: parameter.start for parameter in parameters}
@@ -361,6 +352,21 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
         parameters=parameters,
         matched=matched,
     )
+
+
+def _matched(section: DeckSection, place: Place) -> dict[str, Compared]:
+    """Return what is compared and has a weight, by name; InputError."""
+    matched: dict[str, Compared] = {}
+    for number, compare in enumerate(section.compare):
+        at = f"compare[{number}]"
+        compared = _read_compared(compare, place, at, section.folder)
+        if not compare.weight:
+            continue
+        if matched.setdefault(compared.name, compared) is not compared:
+            raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
+    if not matched:
+        raise place.error("compare", "expected a weight above 0: nothing would be matched")
+    return matched
 
 
 def _command(section: DeckSection, place: Place) -> tuple[str, ...]:
