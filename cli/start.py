@@ -26,6 +26,7 @@ from .options import numbers, with_options
 from .terminal import FILE, FOLDER, command, wrapped
 
 if TYPE_CHECKING:
+    from ..experiments.bubble import BubbleTest
     from ..project.project import Project
 
 DOCS = ROOT / "docs"
@@ -348,27 +349,44 @@ def _text_for_data(
     draft["bounds"] = {"E1": [1, 30000], "E2": [1, 30000], "G12": [0.1, 3000]}
     draft["folder"] = data.resolve().as_posix()
     bubbles = [test for test in tests if test["kind"] == "bubble"]
-    problems = Problems()
-    project = _read_draft(_project_text(tests, draft), problems)
-    sparse = [e.field for e in problems.errors if e.field.endswith("points.pressure.frames")]
-    if sparse:  # fewer frames have a pressure: all of them are taken
-        for number, values in enumerate(bubbles):
-            values["all_frames"] = any(field.startswith(f"bubble[{number}].") for field in sparse)
-        project = _read_draft(_project_text(tests, draft), Problems())
-    sizes = dict.fromkeys(open_sizes)
+    project = _project_of_draft(tests, draft, bubbles)
+    has_pressures = {"rate", "pressure_unit"}.isdisjoint(open_sizes)
     for number, values in enumerate(bubbles, start=1):
         # Without a name in the draft a test is named for its kind; one that is unreadable lacks.
         test = project.tests.get(f"bubble {number}" if len(bubbles) > 1 else "bubble")
-        if not isinstance(test, BubbleTest):
-            continue
-        if {"rate", "pressure_unit"}.isdisjoint(open_sizes):
-            values["recorded"] = _loaded_pressures(test.pressures)
-        if test.of_clamp:
-            values |= {"radius": round(test.outline.radius, 2), "radius_found": True}
+        if isinstance(test, BubbleTest):
+            values |= _read_values_of(test, has_pressures)
+    sizes = dict.fromkeys(open_sizes)
     law = {} if without_cameras and "radius" in open_sizes else _law_for_data(project)
     if without_cameras:
         law["form"] = "constant"
     return _project_text(tests, {**usual, **law, **settings, **sizes})
+
+
+def _project_of_draft(
+    tests: Sequence[dict[str, Any]],
+    draft: Mapping[str, Any],
+    bubbles: Sequence[dict[str, Any]],
+) -> Project:
+    """Return the project of a draft; bubbles with few frames under pressure take all of them."""
+    problems = Problems()
+    project = _read_draft(_project_text(tests, draft), problems)
+    sparse = [e.field for e in problems.errors if e.field.endswith("points.pressure.frames")]
+    if not sparse:
+        return project
+    for number, values in enumerate(bubbles):
+        values["all_frames"] = any(field.startswith(f"bubble[{number}].") for field in sparse)
+    return _read_draft(_project_text(tests, draft), Problems())
+
+
+def _read_values_of(test: BubbleTest, has_pressures: bool) -> dict[str, Any]:
+    """Return values of a bubble's section that its files tell."""
+    values: dict[str, Any] = {}
+    if has_pressures:
+        values["recorded"] = _loaded_pressures(test.pressures)
+    if test.of_clamp:
+        values |= {"radius": round(test.outline.radius, 2), "radius_found": True}
+    return values
 
 
 def _loaded_pressures(pressures: Sequence[float], count: int = 12) -> list[float]:

@@ -193,15 +193,11 @@ def read_heights(file: Path) -> GaugedBubble:
     """Recognise a table of pressure and height at one place or several; raise InputError."""
     table = read_machine_table(file, TableOptions(quantities=("pressure",)))
     pressure = table.column("pressure")
-    heights = [table.names[i] for i in columns_of(table.names, "height", {})]
-    heights = [name for name in heights if name != pressure and not _has_other_unit(table, name)]
-    places = [_place_in(name) for name in table.names]
-    if any(places):
-        named = zip(table.names, places, strict=True)
-        heights = [name for name, xy in named if xy or name in heights]
+    heights = _columns_of_heights(table, pressure)
     if not heights:
         raise InputError(file, f"line {table.header}", "no column of heights")
-    gauges = GaugedBubble("heights", is_central=len(heights) == 1 and not any(places))
+    has_places = any(map(_place_in, table.names))
+    gauges = GaugedBubble("heights", is_central=len(heights) == 1 and not has_places)
     if not gauges.is_central:
         gauges.keys["places"] = [_place_in(name) or [0.0, 0.0] for name in heights]
         if sum(_place_in(name) is None for name in heights) > 1:  # more than the apex
@@ -210,6 +206,17 @@ def read_heights(file: Path) -> GaugedBubble:
     gauges.add_unit("pressure_unit", table, [pressure], "kPa")
     gauges.add_unit("length_unit", table, heights, "mm")
     return gauges
+
+
+def _columns_of_heights(table: MachineTable, pressure: str) -> list[str]:
+    """Return the columns whose name says height or, at any place, a position."""
+    is_height = {table.names[i] for i in columns_of(table.names, "height", {})}
+    return [
+        name
+        for name in table.names
+        if _place_in(name)
+        or (name in is_height and name != pressure and not _has_other_unit(table, name))
+    ]
 
 
 def _has_other_unit(table: MachineTable, name: str) -> bool:
