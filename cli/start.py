@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import re
 import sys
@@ -390,8 +391,14 @@ def _read_values_of(test: BubbleTest, has_pressures: bool) -> dict[str, Any]:
 
 
 def _loaded_pressures(pressures: Sequence[float], count: int = 12) -> list[float]:
-    """Return recorded pressures (MPa) in kPa, at most `count`, without those of a sheet at rest."""
-    loaded = [round(1e3 * p, 1) for p in pressures if p > 0.03 * max(pressures)]
+    """Return recorded pressures (MPa) in kPa, at most `count`, without those of a sheet at rest.
+
+    They are rounded to a thousandth of the largest or so, and equal ones are left out.
+    """
+    largest = 1e3 * max(pressures)
+    digits = max(1, 2 - math.floor(math.log10(largest))) if largest > 0 else 1
+    rounded = [round(1e3 * p, digits) for p in pressures if 1e3 * p > 0.03 * largest]
+    loaded = list(dict.fromkeys(rounded))
     step = (len(loaded) - 1) / max(1, min(count, len(loaded)) - 1)
     return [loaded[round(step * number)] for number in range(min(count, len(loaded)))]
 

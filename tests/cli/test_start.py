@@ -6,6 +6,7 @@ import tomllib
 from types import SimpleNamespace
 
 import jsonschema
+import numpy as np
 import pytest
 from bubblefit.cli import start
 from bubblefit.cli.start import KINDS, SHIPPED
@@ -41,6 +42,14 @@ def test_every_example_comes_with_the_schema(tmp_path):
             assert path.read_text().startswith("#:schema project.schema.json\n")
         assert (folder / SHIPPED.name).read_text() == SHIPPED.read_text()
     assert len(read_project(tmp_path / "bend" / "project.toml").tests) == 9
+
+
+def test_pressures_of_frames_are_written_as_a_project_takes_them():
+    """Two frames of a hold are one pressure, and small pressures are not rounded to each other."""
+    assert start._loaded_pressures([0.0, 0.1014, 0.10142, 0.2]) == [101.4, 200.0]
+    assert start._loaded_pressures([0.00012, 0.00031, 0.0005]) == [0.12, 0.31, 0.5]
+    many = start._loaded_pressures(np.linspace(0.0, 0.3, 40))
+    assert len(many) == 12 and many[-1] == 300.0 and (np.diff(many) > 0).all()
 
 
 def own(*options, cwd, code=0):
