@@ -437,6 +437,8 @@ def pair_over_load(warp: BiaxialTable, fill: BiaxialTable) -> BiaxialTable:
         words = "at equal times, as one direction carries no load"
     # Beyond its readings the fill is not extrapolated.
     is_paired = (warp_place >= fill_place[0]) & (warp_place <= fill_place[-1])
+    if not is_paired.any():
+        raise InputError(fill.path, "time", f"no reading is of the times of {warp.name}")
     place = warp_place[is_paired]
     fill_load, fill_strain = (
         np.interp(place, fill_place, values[:, 0]) for values in (fill.load, fill.strain)

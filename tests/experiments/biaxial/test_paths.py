@@ -214,6 +214,8 @@ def test_direction_without_load_is_paired_over_the_time(tmp_path, loaded):
     np.testing.assert_allclose(both.strain, times["warp"][1:, None] * share)
     assert find_cycles(both.load)[0].ratio == ("1:0" if loaded == "warp" else "0:1")
     assert "at equal times" in both.source.notes[-1]
+    later = replace(tables["fill"], time=tables["fill"].time + 100.0)
+    complaint_with(["fill.csv", "time", "warp.csv"], pair_over_load, tables["warp"], later)
     tables["warp"] = replace(tables["warp"], time=None)
     unloaded = {"warp": "fill.csv", "fill": "warp.csv"}[loaded]
     complaint_with([unloaded, "carries no load", "column of time"], pair_over_load, **tables)
