@@ -10,6 +10,7 @@ next test. Nothing outside the folder of a kind in this package asks which kind 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -548,6 +549,9 @@ class FittedTest:
         The uncertainty of the law, where it was assessed.
     compared_with : sequence of str
         Names of all comparisons of the fit, those of its other tests included.
+    without_mesh_error : mapping of str to float
+        The values of `nuisance` that belong to `law`, where the error of the mesh is taken out of
+        both; those of `nuisance` are of the mesh of the histories.
     """
 
     comparisons: tuple[Comparison, ...]
@@ -559,6 +563,12 @@ class FittedTest:
     valid: Array
     certainty: Certainty | None
     compared_with: Sequence[str] = ()
+    without_mesh_error: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def reported_nuisance(self) -> dict[str, float]:
+        """Return the values of the nuisance unknowns that are reported with the law."""
+        return {**self.nuisance, **self.without_mesh_error}
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,8 +183,12 @@ class Fit(Reported):
         names = [nuisance.name for nuisance in self.problem.unknowns.nuisance.shared]
         if "thickness" not in names:
             return self.project.fabric.thickness
-        unknowns = self.best.point.unknowns if self.posterior is None else self.posterior.best
-        return float(unknowns[self.problem.unknowns.size + names.index("thickness")])
+        return float(self._reported[self.problem.unknowns.size + names.index("thickness")])
+
+    @property
+    def _reported(self) -> Array:
+        """Return the unknowns (n,) that are reported, those of the law of the card."""
+        return self.best.point.unknowns if self.posterior is None else self.posterior.best
 
     @cached_property
     def verdicts(self) -> tuple[NuisanceVerdict, ...]:
@@ -214,10 +218,11 @@ class Fit(Reported):
             comparisons = self.setup.comparisons_of(prepared)
             numbers = [names.index(comparison.name) for comparison in comparisons]
             nuisance: dict[str, float] = {}
+            reported: dict[str, float] = {}
+            values = self.problem.unknowns.nuisance_values
             for number in numbers:
-                nuisance |= self.problem.unknowns.nuisance_values(
-                    names[number], best.point.unknowns
-                )
+                nuisance |= values(names[number], best.point.unknowns)
+                reported |= values(names[number], self._reported)
             fitted[prepared.test.name] = FittedTest(
                 comparisons=comparisons,
                 histories=tuple(best.point.histories[number] for number in numbers),
@@ -228,6 +233,7 @@ class Fit(Reported):
                 valid=best.valid,
                 certainty=best.certainty,
                 compared_with=names,
+                without_mesh_error=reported,
             )
         return fitted
 
@@ -627,14 +633,12 @@ class Fit(Reported):
         nuisance = unknowns.nuisance.all
         names = [*unknowns.labels, *unknowns.nuisance.names]
         scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
-        y = self.best.point.unknowns
         sigma = np.full(len(names), np.nan)
         correlations = np.full((len(names), len(names)), np.nan)
         if self.posterior is not None:
-            y = self.posterior.best
             sigma = np.sqrt(np.diag(self.posterior.coefficient_covariance)) / scale
             correlations = self.posterior.correlations
-        values = np.concatenate([self.law.beta[list(unknowns.free)], y[size:]]) / scale
+        values = np.concatenate([self.law.beta[list(unknowns.free)], self._reported[size:]]) / scale
         lower, upper = unknowns.box
         nuisance_lower, nuisance_upper = unknowns.nuisance.bounds
         units = [scales.modulus_unit] * size + [n.unit for n in nuisance]

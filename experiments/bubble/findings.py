@@ -72,10 +72,14 @@ def fitted_model(fitted: FittedTest) -> BubbleModel:
 
 
 def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any]:
-    """Return the entries of result.json on the sheet; lengths mm, slack %."""
+    """Return the entries of result.json on the sheet; lengths mm, slack %.
+
+    The surface and the motion of the rim are those of the model, which are drawn.
+    """
     sheet = prepared.test.sheet
-    model = fitted_model(fitted)
-    heights = model.mesh.points[:, 2]
+    heights = fitted_model(fitted).mesh.points[:, 2]
+    nuisance = fitted.reported_nuisance
+    model = cast(BubbleModel, fitted.comparisons[0].model_at(nuisance))
     surface = prepared.sheet.surface
     reference_pressure = None
     if sheet.reference_frame is not None:
@@ -87,10 +91,10 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "used": _used_of_sheet(sheet),
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
-        "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
+        "modes_mm": {name: nuisance[name] for name in model.modes},
         "slack_percent": [100 * slack for slack in model.slack] if sheet.slack else None,
         "tension_N_per_mm": list(model.tension) if sheet.clamped_under_tension else None,
-        "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
+        "metric_percent": {name: nuisance[name] for name in model.strains},
         "rim_motion_mm": motion,
         "constant_field_rms_mm": _constant_field_rms(sheet, fitted),
         "from_pressure_kPa": reference_pressure,

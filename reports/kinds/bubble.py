@@ -105,12 +105,12 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     test = prepared.test
     objective = objective_of(fitted)
     mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
-    offset = amounts_of(OFFSETS, fitted.nuisance)
+    offset = amounts_of(OFFSETS, fitted.reported_nuisance)
     numbers: dict[str, Any] = {
         "mean_abs_mm": mean,
         "nuisance": {
             "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
-            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
+            "pressure_offset_kPa": fitted.reported_nuisance.get("pressure_offset"),
         },
         "data": {
             "matched_by": test.match_by,
@@ -163,7 +163,8 @@ def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[
 def _nuisance_lines(fitted: FittedTest) -> list[str]:
     """Return a line on the fitted offsets that have no prior, if there are any."""
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
-    words = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
+    values = fitted.reported_nuisance
+    words = ", ".join(f"{name} {values[name]:.3f} {unit}" for name, unit in units.items())
     return [f"nuisance: {words}"] if units else []
 
 

@@ -55,7 +55,7 @@ def rms_errors(fitted: FittedTest) -> list[tuple[ReadingSeries, float]]:
 
 def findings(prepared: PreparedReadings, fitted: FittedTest) -> Findings:
     """Return what the best fit means for the test: RMS errors, warnings, words."""
-    numbers: dict[str, Any] = {"series": {}, "nuisance": dict(fitted.nuisance)}
+    numbers: dict[str, Any] = {"series": {}, "nuisance": fitted.reported_nuisance}
     words = []
     for series, rms in rms_errors(fitted):
         unit = series.unit
@@ -69,7 +69,7 @@ def findings(prepared: PreparedReadings, fitted: FittedTest) -> Findings:
         words.append(f"{series.label} {rms:.3g} {unit.name}")
     summary = f"RMS errors: {', '.join(words)}"
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance}
-    nuisance = [f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items()]
+    nuisance = [f"{name} {numbers['nuisance'][name]:.3f} {unit}" for name, unit in units.items()]
     lines = [summary]
     if nuisance:
         lines.append(f"nuisance: {', '.join(nuisance)}")

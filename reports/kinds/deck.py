@@ -45,7 +45,8 @@ class DeckPresenter(PagePresenter):
     ) -> Exhibit:
         """Write the filled deck, and return charts for the page."""
         model = prepared.test.model
-        changes = {name: fitted.nuisance[name] - value for name, value in model.values.items()}
+        values = fitted.reported_nuisance
+        changes = {name: values[name] - value for name, value in model.values.items()}
         deck = model.with_parameters(changes).deck(fitted.law)
         write_text(out.path(model.deck_name), str(deck.files[model.deck_name]))
         charts = _charts(prepared.test.name, {"modelled": self.residuals(prepared, fitted)})

@@ -132,7 +132,7 @@ def notes_of_gauges(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     patch.setattr(bubble_readings, "modelled_series", lambda fitted: [])
     test = SimpleNamespace(sheet=SimpleNamespace(has_unknowns=False))
     prepared: Any = SimpleNamespace(data_files=list, test=test)
-    fitted: Any = SimpleNamespace(comparisons=(), nuisance={})
+    fitted: Any = SimpleNamespace(comparisons=(), nuisance={}, reported_nuisance={})
     return bubble_readings.findings(prepared, fitted).warnings
 
 

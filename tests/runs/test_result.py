@@ -245,3 +245,29 @@ def test_report_replaces_a_result_only_if_told(fitted, tmp_path):
     fitted.report(tmp_path)
     raised(OutputError, "already holds a result; overwrite=True", fitted.report, tmp_path)
     fitted.report(tmp_path, overwrite=True)
+
+
+def test_unknowns_are_reported_alike_where_the_mesh_error_is_taken_out():
+    """The offset on page and terminal is that of the table of unknowns, not of the fit's mesh."""
+    beta = [0, 0, 0, 30, 0, 0, 0, 500, 0, 0, 0, 800]
+    bubble = bf.Bubble.of(
+        name="bubble",
+        radius=100.0,
+        pressures=[0.02, 0.05, 0.1],
+        elements=108,
+        symmetry="quarter",
+        nuisance={"pressure_offset": True},
+        sheet={"modes": 1},
+        data={"known_solution": {"form": "constant", "beta": beta, "elements": 432}},
+    )
+    bounds = {"E1": [20, 3000], "E2": [20, 3000], "G12": [1, 300]}
+    law = bf.Law("constant", bounds=bounds, strain_range=[0.03] * 3)
+    fit = bf.fit([bubble], law, fabric=bf.Fabric("x", 0.8), starts=1, jobs=1)
+    assert fit.best.certainty.taken_out
+    values = {name: entry["value"] for name, entry in fit.result["unknowns"].items()}
+    assert values != fit.tests["bubble"].nuisance
+    assert fit.result["nuisance"]["pressure_offset_kPa"] == values["pressure_offset"]
+    assert fit.result["sheet"]["modes_mm"] == {"z0_1": values["z0_1"]}
+    coefficients = fit.coefficients().set_index("unknown")["value"]
+    assert coefficients[list(values)].tolist() == list(values.values())
+    assert f"pressure_offset {values['pressure_offset']:.3f} kPa" in str(fit.findings)

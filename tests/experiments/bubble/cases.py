@@ -219,5 +219,10 @@ def fitted_sheet(sheet: SheetSettings) -> tuple[Any, Any]:
     history = History(np.array(TWO), moved, np.zeros(3), np.zeros(3))
     test = SimpleNamespace(name="b", sheet=sheet, pressures=TWO, outline=Outline.circle(100.0))
     surface = SimpleNamespace(surface=SURFACE if sheet.measured else None)
-    fit = SimpleNamespace(comparisons=[comparison], nuisance=values, histories=[history])
+    fit = SimpleNamespace(
+        comparisons=[comparison],
+        nuisance=values,
+        reported_nuisance=values,
+        histories=[history],
+    )
     return SimpleNamespace(test=test, sheet=surface, known=None), fit
