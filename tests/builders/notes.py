@@ -175,7 +175,9 @@ def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[No
     def refuse(make_solver: Any) -> Any:
         raise InputError(None, "points", "lie on a part of the disk only")
 
-    other: Any = SimpleNamespace(test=SimpleNamespace(name="other"), virtual_work=refuse)
+    other: Any = SimpleNamespace(
+        test=SimpleNamespace(name="other", weight=1.0), virtual_work=refuse
+    )
     tests = (replace(prepared, test=test, fields=fields), other)
     return estimate_of(replace(setup, tests=tests)).notes
 
