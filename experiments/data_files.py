@@ -15,7 +15,7 @@ from ..light_dataclasses import dataclass
 from ..notes import NoteKind
 from ..readers.frames import Array, FrameSource
 from ..storage.reading import checksum
-from ..storage.writing import replacing
+from ..storage.writing import replacing, write_csv
 
 READING = NoteKind("how a file was read")
 
@@ -117,15 +117,15 @@ class Output:
         file: str,
         table: pd.DataFrame,
         description: str = "",
-        digits: str | None = "%.9g",
+        digits: int | None = 9,
     ) -> CaptionedFile:
         """Write a table as CSV; return the name of the file and its description.
 
         Parameters
         ----------
-        digits : str or None
-            Format of numbers; None writes all digits.
+        digits : int or None
+            Of numbers; None writes all.
         """
         with replacing(self.path(file)) as path:
-            table.to_csv(path, index=False, float_format=digits)
+            write_csv(table, path, digits)
         return self.name(file), description

@@ -288,7 +288,7 @@ def write_page_data(folder: Path, report: Report) -> Path:
     """
     content = {"layout": LAYOUT, **plain_values(report)}
     path = folder / PAGE_DATA
-    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(path, json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n")
     return path
 
 

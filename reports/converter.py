@@ -14,6 +14,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import OutputError
@@ -112,6 +113,8 @@ class Background:
     def __init__(self) -> None:
         self._threads: ThreadPoolExecutor | None = None
         self._drawings: list[Future[Any]] = []
+        #: Files of the page so far that are drawn.
+        self.files = set[Path]()
 
     @contextmanager
     def during_page(self) -> Iterator[None]:
@@ -125,6 +128,7 @@ class Background:
         if self._threads is not None:  # the page of a fit within that of a study
             yield
             return
+        self.files = set()
         threads = ThreadPoolExecutor(drawn_at_once())
         self._threads = threads
         try:

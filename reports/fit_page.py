@@ -445,6 +445,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
         write_table(table, folder / name)
     write_notes(folder, fit.notes)
     page = write_report(folder, _page(fit, folder))
+    background.wait()
     store.finish(fit.result)
     return page
 
@@ -493,8 +494,11 @@ def _page(fit: Fit, folder: Path) -> Report:
 
 def _present(files: Sequence[tuple[str, str]], folder: Path) -> list[tuple[str, str]]:
     """Return the files that the folder has when its pictures are drawn, and result.json."""
-    background.wait()
-    return [file for file in files if file[0] == RESULT or (folder / file[0]).exists()]
+    return [
+        file
+        for file in files
+        if file[0] == RESULT or folder / file[0] in background.files or (folder / file[0]).exists()
+    ]
 
 
 def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:

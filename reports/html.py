@@ -84,7 +84,6 @@ def write_page(
     """
     path = folder / PAGE if path is None else path
     with converter.background.during_page():
-        converter.background.wait()  # pictures of the folder stand in the page
         write_text(path, _rendered(folder, report, letterhead))
     return path
 
@@ -94,6 +93,8 @@ def _rendered(folder: Path, report: Report, letterhead: Path | None) -> str:
     from jinja2 import FileSystemLoader
 
     drawings: dict[str, Callable[[], Markup]] = {}
+    if any(part.part == "picture" for part in report.parts):
+        converter.background.wait()  # they lie in the folder
     pictures = {
         part.file: converter.background.begin(data_uri, folder, part.file)
         for part in report.parts
@@ -243,7 +244,7 @@ def data_uri(folder: Path, file: str, *, max_width: int = 1600, colours: int = 1
     if small.width > max_width:
         small = small.resize((max_width, round(small.height * max_width / small.width)))
     stream = BytesIO()
-    small.quantize(colours, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    small.quantize(colours, dither=Image.Dither.NONE).save(stream, "PNG")
     return png_uri(stream)
 
 

@@ -8,6 +8,7 @@ import base64
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from math import prod
 from pathlib import Path
 from typing import Any, Literal
@@ -48,7 +49,7 @@ class Packed:
     step: float
     data: str
 
-    @property
+    @cached_property
     def values(self) -> Array:
         """Return the array, to within half a `step`.
 

@@ -113,6 +113,7 @@ def save(path: Path | str, charts: Charts) -> Path:
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(path, "", f"expected a name that ends in {', '.join(SUFFIXES)}")
     background.begin(_write_drawing, path, charts)
+    background.files.add(path)
     return path
 
 

@@ -42,6 +42,7 @@ from ..storage.writing import (
     plain_values,
     remove_unfinished,
     replacing,
+    write_csv,
     write_text,
 )
 from ..version import __version__
@@ -279,8 +280,7 @@ def write_table(table: pd.DataFrame, path: Path | str, digits: int | None = 9) -
         if kind == PARQUET:
             table.to_parquet(temporary, engine="pyarrow", index=False)
         else:
-            form = None if digits is None else f"%.{digits}g"
-            table.to_csv(temporary, index=False, float_format=form, lineterminator="\n")
+            write_csv(table, temporary, digits)
     return path
 
 

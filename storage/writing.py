@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError
+from ..lazy_modules import pandas as pd
 from ..lazy_modules import psutil
 
 
@@ -96,6 +97,20 @@ def cache_folder() -> Path:
 
     named = os.environ.get("BUBBLEFIT_CACHE")
     return Path(named) if named else user_cache_path("bubblefit", appauthor=False)
+
+
+def write_csv(table: pd.DataFrame, path: Path, digits: int | None = 9) -> None:
+    """Write a table as CSV, its numbers with so many digits; None writes all."""
+    if digits is not None:
+        # pandas asks of each number whether it is missing, which takes four times as long.
+        numbers = table.select_dtypes(["float64", "float32"])
+        table = table.assign(**{str(name): _texts(numbers[name], digits) for name in numbers})
+    table.to_csv(path, index=False, lineterminator="\n")
+
+
+def _texts(numbers: pd.Series, digits: int) -> list[str]:
+    """Return numbers as text; that of a missing one is empty."""
+    return ["" if math.isnan(number) else f"{number:.{digits}g}" for number in numbers.tolist()]
 
 
 def json_text(content: Any) -> str:

@@ -258,14 +258,16 @@ def _squares_left_out(terms: Array, residual: Array, groups: Sequence[Array]) ->
     """
     orthonormal = np.linalg.qr(terms)[0]
     squares = 0.0
-    for group in groups:
-        rows = orthonormal[group]
+    for size in {len(group) for group in groups}:  # groups of a size together
+        same_size = np.array([group for group in groups if len(group) == size])
+        rows = orthonormal[same_size]
         # Errors of a fit without the group: (I - H)^-1 residual, H the group's block of the hat
         # matrix.
-        without = np.eye(len(rows)) - rows @ rows.T
-        if np.linalg.cond(without) > 1e12:
+        without = np.eye(size) - rows @ rows.swapaxes(1, 2)
+        if (np.linalg.cond(without) > 1e12).any():
             return float("inf")  # the other points do not determine the coefficients
-        squares += float((np.linalg.solve(without, residual[group]) ** 2).sum())
+        errors = np.linalg.solve(without, residual[same_size, None])
+        squares += float((errors**2).sum())
     return squares
 
 

@@ -669,7 +669,7 @@ def sheet_exhibit(
         figures.append(saved(out, f"{field.stem}.png", charts, field.caption))
         columns = {"x": field.points[:, 0], "y": field.points[:, 1], **field.values}
         table = pd.DataFrame(columns).add_suffix("_mm")
-        files.append(out.write(f"{field.stem}.csv", table, field.description, "%.6g"))
+        files.append(out.write(f"{field.stem}.csv", table, field.description, 6))
     return figures, files
 
 

@@ -45,7 +45,7 @@ def test_picture_is_drawn_beside_the_page_and_there_when_it_ends(tmp_path, monke
     path = tmp_path / "c.svg"
     with background.during_page():
         vega.save(path, Charts("c", [CHART], "a line"))
-        assert not path.exists()  # the page goes on
+        assert not path.exists() and path in background.files  # the page goes on, and lists it
         with background.during_page():  # that of a fit within that of a study
             pass
         assert not path.exists()

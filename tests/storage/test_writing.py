@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.errors import OutputError
 from bubblefit.storage import writing
@@ -34,6 +35,15 @@ def test_replaced_file_is_whole_or_as_before(tmp_path):
         raise KeyboardInterrupt
     assert path.read_text() == "first"
     assert [file.name for file in path.parent.iterdir()] == ["table.csv"]
+
+
+def test_numbers_of_a_table_are_those_that_pandas_writes(tmp_path):
+    numbers = [0.1, -0.0, math.nan, math.inf, 1e-300, 123456789012.0, 1 / 3]
+    table = pd.DataFrame({"a": numbers, "b, c": np.float32(numbers), "d": 2**60, "e": "x,y"})
+    for digits in (9, 6, None):
+        writing.write_csv(table, tmp_path / "a.csv", digits)
+        expected = table.to_csv(index=False, float_format=digits and f"%.{digits}g")
+        assert (tmp_path / "a.csv").read_text() == expected
 
 
 def test_file_in_a_file_is_refused_with_advice(tmp_path):
