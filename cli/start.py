@@ -348,7 +348,7 @@ def _text_for_data(
         usual = {**usual, "law_symmetry": "balanced"}  # warp and fill cannot be told apart
     draft = {**usual, **settings, **{size: SIZES[size][1] for size in open_sizes}}
     draft["bounds"] = {"E1": [1, 30000], "E2": [1, 30000], "G12": [0.1, 3000]}
-    draft["folder"] = data.resolve().as_posix()
+    draft |= {"folder": data.resolve().as_posix(), "is_draft": True}
     bubbles = [test for test in tests if test["kind"] == "bubble"]
     project = _project_of_draft(tests, draft, bubbles)
     has_pressures = {"rate", "pressure_unit"}.isdisjoint(open_sizes)

@@ -152,6 +152,9 @@ LARGEST_CURVATURE = 0.1
 #: Words of a name; StrainMD has two.
 WORD = re.compile(r"[A-ZÄÖÜ]{2,}(?![a-zäöü])|[A-ZÄÖÜ]?[a-zäöü]+|[A-ZÄÖÜ]")
 
+#: Two coordinates; of "Laser 1 at 50" and "z1 50" the first number is that of the gauge.
+COORDINATES = re.compile(rf"(?<![\w.,]){NUMBER}[\s/;|]+{NUMBER}")
+
 #: A pressure above the numbers of a file: "# p_bar = 0.53", "Pressure (kPa): 52".
 PRESSURE = re.compile(
     rf"(?i)\b(?:p|pressure|druck)[\s_(\[]*(mbar|bar|MPa|kPa|hPa|Pa|psi)[\s)\]]*[=:;,]\s*({NUMBER})"
@@ -232,7 +235,8 @@ def _place_in(name: str) -> list[float] | None:
     axes = [axis for axis, known in enumerate(DIRECTION_WORDS.values()) if words & known]
     if len(axes) == 1 and numbers:  # a number before is that of the gauge
         return [0.0, numbers[-1]] if axes[0] else [numbers[-1], 0.0]
-    return numbers if len(numbers) == 2 else None
+    is_pair = len(axes) == 2 or COORDINATES.search(plain)
+    return numbers if len(numbers) == 2 and is_pair else None
 
 
 def read_profiles(file: Path) -> GaugedBubble:

@@ -203,6 +203,19 @@ def test_a_table_of_the_apex_passes_the_check(tmp_path, unit, power):
     assert bubble["data"]["apex"]["files"] == ["apex.csv"] and "sheet" not in bubble
 
 
+def test_places_of_gauges_that_no_heading_tells_are_to_be_filled_in(tmp_path):
+    (tmp_path / "data").mkdir()
+    rows = [f"{p},{h},{0.76 * h:.2f}" for p, h in zip(PRESSURES, APEX, strict=True)]
+    table = "\n".join(["p (kPa),Laser 1 (mm),Laser 2 (mm)", *rows])
+    (tmp_path / "data" / "gauges.csv").write_text(table)
+    sizes = ("--thickness", 0.8, "--radius", 100)
+    in_process("init", "fabric", "--own", "--data", "data", *sizes, cwd=tmp_path)
+    (bubble,) = table_of(tmp_path)["bubble"]
+    assert "places" not in bubble["data"]["heights"] and {*table_of(tmp_path)["law"]["bounds"]}
+    refused = in_process("check", "fabric", cwd=tmp_path, code=2)
+    one_line(refused, "places gives [x, y] of each")
+
+
 def test_gauges_and_profiles_are_one_bubble(tmp_path):
     rows = [f"{p},{h},{0.76 * h:.2f}" for p, h in zip(PRESSURES, APEX, strict=True)]
     heights = "\n".join(["p (kPa),apex (mm),warp 50 (mm)", *rows])

@@ -194,6 +194,14 @@ def test_places_of_gauges_stand_in_their_headings(tmp_path, heading, places):
     assert not gauges.remarks
 
 
+@pytest.mark.parametrize("headings", ["Laser 1 at 30 mm,Laser 2 at 60 mm", "z1 30,z2 60"])
+def test_number_of_a_gauge_is_no_coordinate(tmp_path, headings):
+    gauges = read_heights(table(tmp_path, f"p (kPa),{headings}"))
+    assert gauges.keys["places"] == [[0.0, 0.0]] * 2 and "places" in gauges.remarks
+    both = read_heights(table(tmp_path, "p (kPa),h x=30 y=-20 (mm),h x=0 y=0 (mm)"))
+    assert both.keys["places"] == [[30.0, -20.0], [0.0, 0.0]]
+
+
 def test_what_headings_do_not_tell_is_a_remark(tmp_path):
     gauges = read_heights(table(tmp_path, "gauge pressure,height left,height right"))
     assert gauges.keys["pressure_unit"] == "kPa" and gauges.keys["length_unit"] == "mm"
