@@ -5,17 +5,20 @@ Untrusted: size is limited, formulas give their stored value, macros, links, pic
 
 import warnings
 import zipfile
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
 from ...storage.reading import read_bytes
-from ..machine_export import find_header, quantity_words, table_from_rows
+from ..machine_export import are_directions, find_header, quantity_words, table_from_rows
 from ..machine_tables import MachineTable, TableOptions
 from ..quantities import MAX_COLUMNS
 from ..registry import Format, register_format
-from ..tables import Row, Rows
+from ..tables import Row, Rows, TextTable
 
 #: Bytes of a workbook at most.
 LARGEST = 50 * 2**20
@@ -26,10 +29,19 @@ MOST_CELLS = 5_000_000
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
-    """Read the table of the sheet that is named, else of the one sheet that has such a table."""
+    """Read the table of the sheet that is named, else of the one sheet that has such a table.
+
+    Sheets with such tables that are all named by directions are read as one.
+    """
     sheets = _read_sheets(path, options.sheet)
     headers = {name: find_header(rows, options) for name, rows in sheets.items()}
     headers_found = {name: index for name, index in headers.items() if index is not None}
+    if len(headers_found) > 1 and are_directions(list(headers_found)):
+        tables = {
+            name: table_from_rows(path, sheets[name], index, options)
+            for name, index in headers_found.items()
+        }
+        return _joined_directions(path, tables)
     if len(headers_found) != 1:
         listed = ", ".join(map(repr, sheets))
         problem = f"no sheet has a row of names with {quantity_words(options)}; it has: {listed}"
@@ -39,6 +51,23 @@ def read(path: Path, options: TableOptions) -> MachineTable:
         raise InputError(path, "", problem)
     ((name, header_index),) = headers_found.items()
     return table_from_rows(path, sheets[name], header_index, options)
+
+
+def _joined_directions(path: Path, tables: Mapping[str, MachineTable]) -> MachineTable:
+    """Return the tables of sheets that are named by directions as one, with a column of these."""
+    first, *others = tables.values()
+    names = ", ".join(map(repr, tables))
+    if "direction" in first.names or any(
+        (table.names, table.units) != (first.names, first.units) for table in others
+    ):
+        raise InputError(path, "", f"the tables of the sheets {names} differ; say sheet")
+    columns = [*first.names, "direction"]
+    rows = [[*cells, name] for name, table in tables.items() for cells in table.table.rows]
+    lines = np.concatenate([table.table.lines for table in tables.values()])
+    joined = TextTable(path, columns, rows, lines, first.table.decimal)
+    notes = [note for table in tables.values() for note in table.notes]
+    notes.append(f"{path.name}: the sheets {names} are those directions")
+    return MachineTable(joined, {**first.units, "direction": ""}, first.header, tuple(notes))
 
 
 def _read_sheets(path: Path, sheet: str | None) -> dict[str, Rows]:

@@ -39,6 +39,15 @@ def test_sheet_of_a_workbook_with_the_quantities_is_read(tmp_path):
     assert curve.load.tolist() == [0, 10, 20.5, 30]
     own = {"direction": "warp", "sheet": "K3"}
     complaint_with(["b.xlsx: sheet", "'K3'", "'K1', 'K2'"], read_load_curves, two, **own)
+    # Sheets that are named by directions are read together.
+    by_direction = written_workbook(tmp_path / "e.xlsx", Kette=TABLE, Schuss=[*TABLE, [6, 2.5, 30]])
+    warp, fill = read_load_curves(by_direction)
+    assert (warp.direction, warp.load.tolist()) == ("warp", [0, 10, 20.5])
+    assert (fill.direction, fill.load.tolist()) == ("fill", [0, 10, 20.5, 30])
+    assert "'Kette', 'Schuss' are those directions" in fill.notes[0]
+    other = [["Weg", "Kraft"], *TABLE[1:]]
+    differing = written_workbook(tmp_path / "f.xlsx", warp=TABLE, bias=other)
+    complaint_with(["f.xlsx", "'warp', 'bias' differ", "sheet"], read_load_curves, differing)
     # Formulas have the value that was stored with them, or none: nothing is computed.
     formula = written_workbook(
         tmp_path / "c.xlsx", a=[["Weg [mm]", "Kraft [N]"], [0, 0], ["=1+1", 3]]
