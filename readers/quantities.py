@@ -89,7 +89,8 @@ LABELS = {
 DIRECTION_ALIASES: Mapping[str, str] = {
     **{"warp": "warp", "fill": "fill", "weft": "fill", "kette": "warp", "schuss": "fill"},
     **{"chaîne": "warp", "chaine": "warp", "trame": "fill"},
-    **dict.fromkeys("bias bias45 45bias 45 45deg 45grad 45degree 45degreebias diagonal".split(), "bias"),
+    **dict.fromkeys("bias bias45 45bias 45 45deg 45grad 45degree".split(), "bias"),
+    **dict.fromkeys(("45degreebias", "diagonal"), "bias"),
 }
 
 
