@@ -52,6 +52,7 @@ def doubts_of_strips(
     thickness: float,
     expected: Expected,
     grip_distance: float,
+    by_points: bool,
 ) -> Sequence[Doubt]:
     """Return the doubts about the strips of a test: units, preload, failure, grips, directions.
 
@@ -65,6 +66,8 @@ def doubts_of_strips(
         Bounds that the project gives the moduli.
     grip_distance : float, mm
         Free length of the strips between the grips.
+    by_points : bool
+        Whether points are matched, and not polynomials, in which rows beyond the end count too.
     """
     doubts: list[Doubt] = []
     moduli: dict[str, list[float]] = {}
@@ -73,6 +76,7 @@ def doubts_of_strips(
         for specimen, elongation, load in curves_of(strip):
             name = f"{direction}, {specimen}" if specimen else direction
             doubts += _of_curve(name, strip, elongation, load)
+            doubts += _of_failure(name, strip, elongation, load, by_points)
             if direction in MODULUS_ALONG and expected.moduli:
                 modulus = _modulus(strip, elongation, load) / (width * thickness)
                 moduli.setdefault(direction, []).append(modulus)
@@ -170,7 +174,7 @@ def _of_curve(
     elongation: Array,
     load: Array,
 ) -> Iterator[Doubt]:
-    """Yield doubts about one curve: units of elongation, a preload, rows after failure.
+    """Yield doubts about one curve: units of elongation, a preload, a gauge that stands still.
 
     Parameters
     ----------
@@ -186,7 +190,6 @@ def _of_curve(
         yield Doubt("elongation-unit", True, text)
     yield from _of_beginning(name, elongation, load)
     yield from _of_still_gauge(name, strip, elongation, load)
-    yield from _of_failure(name, strip, elongation, load)
 
 
 def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
@@ -256,6 +259,7 @@ def _of_failure(
     strip: Strip,
     elongation: Array,
     load: Array,
+    by_points: bool,
 ) -> Iterator[Doubt]:
     """Yield a doubt if the load falls while the strip is pulled further.
 
@@ -263,22 +267,28 @@ def _of_failure(
     ----------
     elongation, load : (n,) array
         Of the curve, in mm and N.
+    by_points : bool
+        As in `doubts_of_strips`.
     """
     end = strip.elongation
     rows_after_end = np.flatnonzero(elongation > end * (1 + 1e-9))
-    rows = slice(0, rows_after_end[0] if len(rows_after_end) else None)
-    largest_until = np.maximum.accumulate(np.maximum(load[rows], 0.0))
-    is_late = elongation[rows] > LIMITS.slope_at * end
+    end_row = rows_after_end[0] if len(rows_after_end) else len(load)
+    largest_until = np.maximum.accumulate(np.maximum(load, 0.0))
+    is_late = elongation > LIMITS.slope_at * end
     for share in (LIMITS.failure_share, LIMITS.possible_failure_share):
-        fallen_rows = np.flatnonzero((load[rows] < share * largest_until) & is_late)
-        if len(fallen_rows):
+        fallen_rows = np.flatnonzero((load < share * largest_until) & is_late)
+        if len(fallen_rows) and (fallen_rows[0] < end_row or not by_points):
             row = fallen_rows[0]
+            is_within = bool(row < end_row)
+            remedy = ", or say a shorter final_length"
+            if not is_within:
+                remedy = ' or match = "points": the polynomial goes through them too'
             text = (
                 f"{name}: the load falls from {largest_until[row]:.3g} to {load[row]:.3g} N at an "
                 f"elongation of {elongation[row]:.3g} mm: rows after failure; cut them off with "
-                "until_largest_load = true, or say a shorter final_length"
+                f"until_largest_load = true{remedy}"
             )
-            yield Doubt("after-failure", share == LIMITS.failure_share, text)
+            yield Doubt("after-failure", is_within and share == LIMITS.failure_share, text)
             return
 
 

@@ -190,7 +190,9 @@ class PreparedStrips(PreparedParts):
         test = self.test
         thickness = test.place.fabric.thickness
         width = test.total_width
-        return doubts_of_strips(test.strips, width, thickness, expected, test.grip_distance)
+        by_points = test.match_by == "points"
+        distance = test.grip_distance
+        return doubts_of_strips(test.strips, width, thickness, expected, distance, by_points)
 
 
 def _columns_not_of_strip(strip: Strip) -> list[str]:

@@ -159,8 +159,8 @@ GOOD_CURVES = {direction: curve_of_moduli(direction) for direction in MODULI}
 GOOD_WARP, GOOD_FILL = GOOD_CURVES["warp"], GOOD_CURVES["fill"]
 
 
-def strip_doubts_of(strips, thickness=THICKNESS, expected=EXPECTED, grips=75.0):
-    return list(doubts_of_strips(strips, WIDTH, thickness, expected, grips))
+def strip_doubts_of(strips, thickness=THICKNESS, expected=EXPECTED, grips=75.0, by_points=True):
+    return list(doubts_of_strips(strips, WIDTH, thickness, expected, grips, by_points))
 
 
 def strip_doubt_names(curves, **ends):

@@ -60,6 +60,17 @@ def test_extensometer_that_stands_still_is_doubted():
         assert {d.name for d in found} == set(["gauge-still"] * doubt)
 
 
+def test_rows_of_a_failure_beyond_the_end_are_doubted_where_a_polynomial_takes_them():
+    """It is fitted to all rows, of which those beyond the final length are no points."""
+    elongation = np.array([0, 1, 2, 3, 4, 5.0])
+    one = LoadCurve("bias", "1", elongation, np.array([0, 30, 60, 90, 95, 5.0]), None)
+    strips = {"bias": Strip("bias", GAUGE, GAUGE + 3.0, None, (one,))}
+    assert not strip_doubts_of(strips)
+    (found,) = strip_doubts_of(strips, by_points=False)
+    assert (found.name, found.sure) == ("after-failure", False)
+    assert 'match = "points": the polynomial' in found.text
+
+
 @pytest.mark.parametrize(("low", "sure"), [(89.0, False), (70.0, False), (69.9, True)])
 def test_falling_load_may_be_a_failure(low, sure):
     one = LoadCurve("bias", "1", np.array([0, 2, 3, 4.0]), np.array([0, 50, 100, low]), None)
