@@ -20,9 +20,14 @@ from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, by_near_inverse, tangent_for
 from .flexure import Flexure, flexure_of
 from .kernel import reference_elements
+from .line_search import SETTINGS as LINE_SEARCH
 from .line_search import searched_equilibrium
 from .membrane import Membrane, arrays_of, initial_stiffness, refuse_memory
 from .wall import STIFF, Wall
+
+#: Of steps of a viscous motion: where the wall folds, steps that gain little for a while still lead
+#: to an equilibrium, and the motion would come to rest before its end without them.
+VISCOUS_SEARCH = replace(LINE_SEARCH, max_fruitless=LINE_SEARCH.max_steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +239,8 @@ class ClosedMembrane(Membrane):
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
         if self.bodies:
-            return searched_equilibrium(self, u, pressure)
+            settings = VISCOUS_SEARCH if self.viscosity > 0 else LINE_SEARCH
+            return searched_equilibrium(self, u, pressure, settings)
         return super().equilibrium(u, pressure)
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
