@@ -163,6 +163,30 @@ def test_residuals_of_a_quantity_are_those_of_its_blocks():
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(("columns", "names"), [(1, []), (2, ["field"]), (3, [])])
+def test_smooth_residual_is_a_discrepancy_on_a_sheet_only(columns, names):
+    """Places of gauges have three columns, rows of a table one."""
+    random = np.random.default_rng(0)
+    places = random.uniform(-1.0, 1.0, (600, columns))
+    residual = places[:, 0] ** 2 + 0.01 * random.standard_normal(600)
+    objective = SimpleNamespace(
+        positions=(places,), specimens=None, split=lambda values: [values], unit="mm",
+        least_noise=0.01, measured=np.full(600, 2.0),
+    )  # fmt: skip
+    comparison = SimpleNamespace(name="field", objective=objective, may_run_aside=False, model=None)
+    problem = SimpleNamespace(
+        comparisons=[comparison], rows=lambda _: slice(None), scale=np.ones(600),
+        unknowns=SimpleNamespace(count=3),
+    )  # fmt: skip
+    best = SimpleNamespace(jacobian=None)
+    found = discrepancies(problem, residual, np.zeros(600), best, lambda _: 0.0)
+    assert list(found) == names
+    for discrepancy in found.values():
+        assert discrepancy.is_systematic
+        assert discrepancy.rms == pytest.approx(np.sqrt(np.mean(residual**2)), rel=0.02)
+        assert discrepancy.relative_rms == pytest.approx(discrepancy.rms / 2.0)
+
+
 PLACES = np.linspace(0.1, 3.0, 30)
 
 

@@ -1,5 +1,8 @@
 """inference/nuisance.py: unknowns that are no law, of one comparison or shared."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bubblefit.inference.nuisance import NuisanceUnknowns
@@ -65,6 +68,18 @@ def test_shared_nuisance_is_one_unknown():
     # A step may leave the bounds by rounding, a law may not.
     assert nuisance.of_law(np.array([-1e-12, 0.9, 0.0, 0.0])) == {"nu12": 0.0}
     assert NuisanceUnknowns({"a": (NU12,)}).names == ("nu12",)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "drawn"),
+    [(0.3, 2.9, 1.6), (0.3, 3.1, np.sqrt(0.93)), (2.0, 1800.0, 60.0), (0.0, 8.0, 4.0)],
+)
+def test_start_is_drawn_by_logarithm_where_bounds_are_wider_than_ten(lower, upper, drawn):
+    known = replace(SHIFT, begin=0.7)
+    unknown = replace(SHIFT, name="drawn", lower=lower, upper=upper, drawn=True)
+    nuisance = NuisanceUnknowns({"a": (known, unknown)})
+    middle = SimpleNamespace(random=lambda: 0.5)
+    assert nuisance.drawn(middle) == pytest.approx([0.7, drawn])
 
 
 def test_nu12_is_fitted_from_a_wrong_start():

@@ -58,6 +58,16 @@ def test_frames_without_heights_and_with_a_pressure_in_each(tmp_path):
     assert (test["column"], test["in_camera_axes"], test["sizes"]) == ("p", False, ["radius"])
 
 
+@pytest.mark.parametrize(("off", "in_camera_axes"), [(4.9, False), (5.9, True), (-5.9, True)])
+def test_points_a_twentieth_off_centre_are_in_camera_axes(tmp_path, off, in_camera_axes):
+    rows = [f"{x},{y + off},0,0,0,{x * y}" for x in (-50, 0, 50) for y in (-50, 0, 50)]
+    for number in range(2):
+        text = "\n".join(["x,y,z,dx,dy,dz", *rows])
+        (tmp_path / f"test1_{number:02d}.csv").write_text(text)
+    (test,) = proposed_tests(recognised_groups(tmp_path))
+    assert test["in_camera_axes"] is in_camera_axes
+
+
 @pytest.mark.parametrize(
     ("stems", "group"),
     [

@@ -147,7 +147,7 @@ def test_forces_on_the_arms_of_a_cruciform(tmp_path):
     path = tmp_path / "arms.csv"
     path.write_text(head + "1:1;0;0;0;0\n1:1;1;0,5;0,5;1\n")
     complaint_with(["arms.csv", "Kraft Kette", "width"], read_biaxial_table, path)
-    found = read_biaxial_table(path, width=100.0)
+    found = read_biaxial_table(path=path, width=100.0)
     np.testing.assert_allclose(found.load, [[0, 0], [10, 5]])
     path.write_text(head.replace("[kN]", "") + "1:1;0;0;0;0\n1:1;1000;500;0,5;1\n")
     found = read_biaxial_table(path, width=50.0, load_unit="N")

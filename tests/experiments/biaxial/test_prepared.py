@@ -176,10 +176,14 @@ TRAPS = {
 }  # fmt: skip
 
 
-def doubts_of_table(folder, rows):
+def listed_doubts(folder, rows, expected=EXPECTED):
     write_biaxial_rows(folder / "test.csv", rows)
     (test,) = bf.read_project(biaxial_project(folder)).tests.values()
-    return {doubt.name: doubt for doubt in PreparedBiaxial(test).doubts(EXPECTED)}
+    return PreparedBiaxial(test).doubts(expected)
+
+
+def doubts_of_table(folder, rows):
+    return {doubt.name: doubt for doubt in listed_doubts(folder, rows)}
 
 
 @pytest.mark.parametrize("trap", TRAPS)
@@ -194,6 +198,41 @@ def test_mistakes_in_a_biaxial_table_are_doubted(tmp_path, trap):
         assert f"is about {modulus:.3g} MPa" in found["modulus"].text
     if trap in ("another ratio", "yarns of the strains swapped"):
         assert set(found) == set(wanted)
+
+
+#: The bounds of `EXPECTED` do not say which yarn is stiffer, these do.
+STIFF_WARP = Expected({"E1": (500.0, 3000.0), "E2": (200.0, 1500.0), "G12": (1.0, 300.0)})
+
+
+@pytest.mark.parametrize(
+    ("ratios", "words"),
+    [
+        (["1:1"], "in 1:1 the warp is strained 1.5 times as much as the fill is by the same load"),
+        (["2:1", "1:2"], "in 2:1 the warp is strained 1.5 times"),
+        (["0:1", "1:0"], "by the same load in 0:1, and the bounds have the warp stiffer"),
+        (["2:1", "0:1"], None),
+    ],
+)
+def test_warp_that_is_softer_than_the_fill_is_doubted_by_the_bounds(tmp_path, ratios, words):
+    """By equal loads; strains are small, so that their quotient is that of the moduli."""
+    law = HypoelasticLaw.linear(600.0, 900.0, 30.0, 0.0)
+    rows = biaxial_rows(law, ratios, lowest=0.1, highest=0.9)
+    found = listed_doubts(tmp_path, rows, STIFF_WARP)
+    expected = [("swapped", False)] if words else []
+    assert [(doubt.name, doubt.sure) for doubt in found] == expected
+    assert all(words in doubt.text for doubt in found), found
+    assert listed_doubts(tmp_path, rows) == []
+
+
+def test_swapped_yarns_are_doubted_once(tmp_path):
+    rows, _ = TRAPS["yarns of the strains swapped"]
+    (doubt,) = listed_doubts(tmp_path, rows, STIFF_WARP)
+    assert doubt.name == "swapped" and doubt.sure
+
+
+def test_modulus_is_that_of_the_first_path_that_stretches(tmp_path):
+    rows = [(r, 0.02 * a, 0.02 * b, c * (-1 if r == "1:1" else 1), d) for r, a, b, c, d in ROWS]
+    assert doubts_of_table(tmp_path, rows)["modulus"].text.startswith("ratio 2:1: load over")
 
 
 def test_good_biaxial_data_raise_no_doubt(tmp_path):

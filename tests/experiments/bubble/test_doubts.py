@@ -263,6 +263,22 @@ def force(modulus):
 
 AXES = partial(SimpleNamespace, error=0.1, clarity=0.7)
 ELLIPSE = Outline(120.0, 80.0, 30.0)
+
+
+def test_slope_of_rises_over_bumps_leaves_out_planes_and_symmetric_terms():
+    """The sheet's bumps of odd degree are pulled flat by a third; what else it is has no say."""
+    points = points_on(CIRCLE)[::2] * [0.9, 0.7] + [3.0, -5.0]
+    x, y = points.T / 100.0
+    bumps = 3.0 * (x**3 - 2.0 * x * y**2 + 4.0 * x**2 * y**3)
+    smooth = np.stack(
+        [x**i * y**j for i, j in product(range(5), repeat=2) if i + j in (0, 1, 2, 4)]
+    )
+    others = np.random.default_rng(2).uniform(-5.0, 5.0, (2, len(smooth))) @ smooth
+    moved = np.column_stack([0 * x, 0 * x, -bumps / 3 + others[0]])
+    field = field_of(0.2, moved, points, z=bumps + others[1])
+    assert doubts.slope_of_rise_over_bumps(field, CIRCLE) == pytest.approx(-1 / 3, rel=1e-9)
+
+
 #: Where a check begins to speak: how often, whether sure, its words, and what it sees.
 UNIT_LIMITS = [
     *((doubts.length_unit, "length-unit", int(bool(words)), True, words,

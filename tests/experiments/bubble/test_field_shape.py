@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.field_shape import (
+    RADII,
     Axes,
     SmoothField,
     apex_of,
     apex_shape,
     folded,
+    harmonics,
     mirrored,
     smooth_strains,
     symmetry_axes,
@@ -191,6 +193,27 @@ def test_strain_is_counted_along_a_turned_warp():
     pulled = 0.1 * np.column_stack([x, 0 * y, 0 * x])
     (strain,) = smooth_strains(POSITIONS, 0 * x, [pulled], np.array([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(strain, np.tile([0, np.log(1.1), 0], (len(x), 1)), atol=1e-9)
+
+
+def test_harmonics_of_polynomial_fields_in_closed_form():
+    """The field is (4 + 3 x + 8 x^2, 2 - 5 y, 6 x y + 4 x^3), x and y in radii."""
+    points = BUBBLE_FRAMES[0].points
+    x, y = points[:, :2].T / CLAMP_RADIUS
+    moved = np.column_stack([4 + 3 * x + 8 * x**2, 2 - 5 * y, 6 * x * y + 4 * x**3])
+    r, zero = RADII, np.zeros((2, len(RADII)))
+    expected = [
+        [
+            [-r, 0 * r],
+            [4 + 6 * r**2, 2 + 0 * r],
+            [4 * r, 0 * r],
+            [2 * r**2, 0 * r],
+            zero,
+        ],
+        [zero, [2 + 0 * r, -4 - 2 * r**2], [0 * r, -4 * r], [0 * r, -2 * r**2], zero],
+        [zero, [3 * r**3, 0 * r], [0 * r, 3 * r**2], [r**3, 0 * r], zero],
+    ]
+    found = harmonics(Frame(points, moved), CLAMP_RADIUS)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_axes_do_not_depend_on_fields_constant_in_pressure():

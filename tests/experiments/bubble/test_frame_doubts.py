@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import doubts, frame_doubts
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 
+from ...builders.bubbles import CIRCLE, points_on
 from .cases import FIVE_POINTS, assert_doubted, doubts_said, field_of
 
 
@@ -50,6 +52,44 @@ def test_frame_at_rest_under_pressure_is_doubted_and_the_reverse(pressure, rise,
     """The apex rises by 40 mm at 40 kPa; the limits are a quarter of its share, and half of it."""
     fields = tuple(field_of(p, [0, 0, h]) for p, h in ((pressure, rise), (0.02, 30.0), (0.04, 40)))
     assert_doubted(doubts.states_at_rest, bool(words), "rest-frame", True, words, fields=fields)
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        ([1.1, 0.0, 0.5], "moves by 1.1, 0, 0.5 mm on average at 50 kPa"),
+        ([0.0, -1.1, 0.5], "moves by 0, -1.1, 0.5 mm"),
+        ([0.0, 0.0, 5.7], "moves by 0, 0, 5.7 mm"),
+        ([0.8, 0.8, 4.0], ""),
+    ],
+)
+def test_edge_that_moves_is_doubted(motion, words):
+    """By more than 0.03 of the rise along the sheet, or 0.15 of it up."""
+    points = points_on(CIRCLE)
+    moved = motion + np.outer(1.0 - (points**2).sum(axis=1) / 1e4, [0.0, 0.0, 30.0])
+    fields = field_of(0.02, 0.1 * moved, points), field_of(0.05, moved, points)
+    found = list(doubts.moving_edge(MeasuredView(fields, CIRCLE, 0.8, False)))
+    assert [(doubt.name, doubt.sure) for doubt in found] == [("moving-edge", False)] * bool(words)
+    assert all(words in doubt.text for doubt in found), found
+
+
+@pytest.mark.parametrize(
+    ("dome", "rise", "words"),
+    [
+        (10.0, 10.0, ["stands 10 mm above its rim", "about 1.3 kPa by its height"]),
+        (5.1, 5.1, ["stands 5.1 mm", "about 1.3 kPa"]),
+        (4.9, 4.9, []),
+        (-10.0, 10.0, []),
+        (10.0, -10.0, []),
+    ],
+)
+def test_dome_of_the_reference_picture_gives_its_pressure(dome, rise, words):
+    """It is doubted from a twentieth of the radius; an eighth of 10.003 kPa is just above 1.25."""
+    points = points_on(CIRCLE)
+    z = dome * (np.hypot(*points.T) < 50.0)
+    seen = {"fields": (field_of(0.010003, [0, 0, rise], points, z=600.0 + z),)}
+    count = bool(words)
+    assert_doubted(doubts.loaded_reference, count, "loaded-reference", False, *words, **seen)
 
 
 UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])

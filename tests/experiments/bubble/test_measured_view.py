@@ -12,6 +12,7 @@ from ...builders.bubbles import (
     doubts_by_name,
     in_camera,
     noisy,
+    points_on,
     with_clamp,
 )
 from .cases import FIVE_POINTS, field_of
@@ -43,6 +44,27 @@ def test_radius_beside_that_of_the_resting_clamp_is_doubted(clean_bubble, radius
         assert f"says radius {radius:.3g} mm" in found["radius"].text
     if not sure:
         assert ("off-centre" in found) == (off > 0)
+
+
+@pytest.mark.parametrize(
+    ("scatter", "distance", "is_outlying"),
+    [(1.0, 14.4, False), (1.0, 15.3, True), (0.01, 0.58, False), (0.01, 0.62, True)],
+)
+def test_outlier_is_ten_deviations_and_a_fiftieth_of_the_rise_off(scatter, distance, is_outlying):
+    """Ten deviations of errors of 1 mm, of either sign, are 14.8 mm; the rise is 30 mm."""
+    points = points_on(CIRCLE)
+    dome = 30.0 * (1.0 - (points**2).sum(axis=1) / 1e4)
+    chequered = (-1.0) ** np.rint(14.0 * (points / 100.0 - 0.01)).sum(axis=1)
+    rise = dome + scatter * chequered
+    far = int(np.argmin(np.hypot(*(points - 30.0).T)))
+    rise[far] = dome[far] + distance
+    moved = np.column_stack([np.zeros_like(points), rise])
+    view = MeasuredView((field_of(0.1, moved, points),), CIRCLE, 0.8, False)
+    found = view.gross_outliers(view.last)
+    assert np.flatnonzero(found.is_outlying).tolist() == [far] * is_outlying
+    assert found.count == is_outlying
+    assert found.scatter == pytest.approx(1.4826 * scatter, rel=0.03)
+    assert found.farthest == pytest.approx(distance * is_outlying, rel=0.02)
 
 
 @pytest.mark.parametrize("y", [-2.0, 2.0])

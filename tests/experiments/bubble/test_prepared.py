@@ -34,6 +34,7 @@ def test_finer_comparison_divides_quads_and_increments(tmp_path, factor):
     assert own.objective.targets[0].sample is None
     assert found.objective.targets[0].sample.shape[1] == len(found.model.mesh.points)
     # Data of this very model are asked of no other.
+    assert prepared.source == "known"
     (same,) = prepared.finer(setup.make_solver, Weighting(), factor)
     assert len(same.model.mesh.quads) == len(own.model.mesh.quads)
 
@@ -214,3 +215,4 @@ def test_points_too_few_for_a_surface_are_matched_without(count, surface_count):
     project = bf.Project.of(bubble, law, fabric=bf.Fabric("made", 0.8))
     (prepared,) = fit_setup(project).tests
     assert prepared.test.match_degree == 4 and len(prepared.surfaces) == surface_count
+    assert prepared.source == "measured"

@@ -88,6 +88,12 @@ def test_doubts_of_heights(heights):
     assert doubt_names(value=25.4 * apex) == ["height-unit"]
     assert doubt_names(value=5 * apex) == ["radius"]
     assert doubt_names(value=-apex) == ["height-falls"]
+    directions, _ = np.linalg.qr(np.vander(PRESSURES, 3, increasing=True))
+    rising = directions[:, 1] * np.sign(directions[-1, 1])
+    for correlation, doubt in ((-0.45, False), (-0.55, True)):
+        across = np.sqrt(1.0 - correlation**2) * directions[:, 2]
+        value = 20.0 + correlation * rising + across
+        assert ("height-falls" in doubt_names(value=value)) is doubt
     assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
 
 

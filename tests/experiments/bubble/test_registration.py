@@ -85,6 +85,17 @@ def test_sheet_rising_away_from_the_camera_is_turned_not_mirrored():
     assert np.linalg.det(found.placement.axes) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("angle", [3.0, 183.0])
+def test_plane_of_the_camera_is_kept_where_the_sheet_is_inclined(angle):
+    turn = rotation_by("x", angle)
+    frames = [seen_by_camera(f, turn, (0.0, 0.0, 500.0)) for f in BUBBLE_FRAMES]
+    options = RegistrationOptions(plane="camera", centre=(0.0, 0.0, 500.0), warp=0.0)
+    moved, found = register(frames, (CLAMP_RADIUS, CLAMP_RADIUS), options)
+    of_camera = np.diag([1.0, 1.0, 1.0] if angle < 90.0 else [1.0, -1.0, -1.0])
+    np.testing.assert_allclose(found.placement.axes, of_camera, atol=1e-12)
+    np.testing.assert_allclose(moved[-1].displacement, frames[-1].displacement @ of_camera)
+
+
 def test_plane_is_that_of_the_clamp_and_its_motion_is_removed():
     """A sheet that bulges by 4 mm before the test does not tilt the plane; the clamp moves."""
     first = FRAMES_BEYOND_CLAMP[0].points.copy()

@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.section import SheetSection, SheetSettings, outline_of, sheet_of
+from bubblefit.experiments.bubble.registration import RegistrationOptions
+from bubblefit.experiments.bubble.section import (
+    RegistrationSection,
+    SheetSection,
+    SheetSettings,
+    outline_of,
+    registration_options,
+    sheet_of,
+)
 from bubblefit.experiments.sections import Place, Scales
 from bubblefit.meshes.disk import Outline
 from bubblefit.project.project import read_project
@@ -71,7 +79,11 @@ def test_examples_of_measured_bubbles_are_read(name, shared_data):
     "old, new, words",
     [
         ("[bubble.match]", '[bubble.sheet]\nrim = "measured"\n[bubble.match]', ["sheet.rim"]),
-        ("[bubble.match]", "[bubble.sheet]\nmodes = 46\n[bubble.match]", ["sheet.modes"]),
+        (
+            "[bubble.match]",
+            "[bubble.sheet]\nmodes = 46\n[bubble.match]",
+            ["sheet.modes", "equal to 45"],
+        ),
         ("[fit]", CORD % "[[90, 0], [90, 60]]", ["bubble[0].cord[0].ends", "on the disk", "60"]),
         ("[fit]", CORD % "[[9, 8], [9, 8]]", ["bubble[0].cord[0].ends", "apart"]),
         ("[fit]", CORD % "[[9, 8]]", ["bubble[0].cord[0].ends", "at least 2"]),
@@ -97,6 +109,20 @@ def test_bad_input_names_file_and_field(edited_bubble, tmp_path, old, new, words
     source = KNOWN if old in KNOWN.read_text() else VALMEX / "test1-linear.toml"
     said = complaint_with(words, edited_bubble, old, new, source=source, need_data=False)
     assert said.startswith(str(tmp_path / "project.toml"))
+
+
+def test_marks_of_a_registration_are_in_the_unit_of_the_files():
+    section = RegistrationSection(
+        plane="camera", centre=[0.1, 0.0, 0.5], warp_points=[[0, 0, 0.5], [0, 0.2, 0.5]],
+        warp_is="soft", remove_clamp_motion=False,
+    )  # fmt: skip
+    assert registration_options(section, PLACE, 1000.0) == RegistrationOptions(
+        plane="camera",
+        centre=(100.0, 0.0, 500.0),
+        warp_points=((0.0, 0.0, 500.0), (0.0, 200.0, 500.0)),
+        warp_is_stiff=False,
+        remove_clamp_motion=False,
+    )
 
 
 METRES = replace(PLACE, scales=Scales(pressure=0.1, length=1000.0))
