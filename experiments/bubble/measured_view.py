@@ -223,22 +223,32 @@ class MeasuredView:
 
     @property
     def surfaces(self) -> list[RiseSurface]:
-        """Return positions and rises (mm) of the fields that rise by over half of the last rise."""
+        """Return positions and rises (mm) of the fields that rise by over half of the last rise.
+
+        There are none where the sheet falls.
+        """
         return [
             (field.points, field.displacement[:, 2])
             for field, rise in zip(self.fields, self.rises, strict=True)
-            if rise > 0.5 * self.rises[-1]
+            if rise > max(0.5 * self.rises[-1], 0.0)
         ]
 
     @cached_property
     def clamp(self) -> Rim | None:
-        """Find the edge of the clamp; None where no points stand still around the disk."""
+        """Find the edge of the clamp; None where no points stand still around a disk that rises."""
         outline = self.outline
+        if not self.surfaces:
+            return None
         return clamp_of_motion(self.surfaces, (outline.major, outline.minor), outline.angle)
 
     @cached_property
     def rim(self) -> Rim | None:
-        """Find the rim and the turn of an ellipse; None where points do not reach all around it."""
+        """Find the rim and the turn of an ellipse; None where points do not reach all around it.
+
+        It is None, too, where no field rises.
+        """
+        if not self.surfaces:  # nor a rim
+            return None
         try:
             return rim_of_motion(self.surfaces, (self.outline.major, self.outline.minor))
         except InputError:

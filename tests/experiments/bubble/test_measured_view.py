@@ -1,5 +1,7 @@
 """experiments/bubble/measured_view.py: rises and clamp of measured fields."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.measured_view import MeasuredView
@@ -26,6 +28,13 @@ def test_rises_of_a_view_are_those_about_the_centre():
     assert far.rises.tolist() == [11.0]  # no point there: of all
     assert view.apexes == () and view.rim is None and view.axes is None
     assert view.inner(field_of(0.1, moved, FIVE_POINTS * 2.25)).tolist() == [True] * 4 + [False]
+
+
+def test_sheet_that_falls_has_no_rim_and_is_doubted(clean_bubble):
+    fields = [replace(f, displacement=f.displacement * (1.0, 1.0, -1.0)) for f in clean_bubble]
+    view = MeasuredView(tuple(fields), CIRCLE, THICKNESS, False)
+    assert view.surfaces == [] and view.rim is None and view.clamp is None
+    assert doubts_by_name(tuple(fields))["z-flipped"].sure
 
 
 @pytest.mark.parametrize(
