@@ -134,7 +134,7 @@ class Fronts:
             Type of the factors' numbers.
         """
         potrf, trtri = scipy.linalg.get_lapack_funcs(("potrf", "trtri"), dtype=number)
-        syrk = scipy.linalg.get_blas_funcs("syrk", dtype=number)
+        syrk, trmm = scipy.linalg.get_blas_funcs(("syrk", "trmm"), dtype=number)
         numbers: Floats = np.zeros(self.panels[-1], dtype=number)
         numbers[self.places] = data[self.lower]
         remainders: list[Floats] = []
@@ -153,7 +153,7 @@ class Fronts:
                 inverse, _ = trtri(factor, lower=1)
                 panel[:width] = inverse
             if 0 < width < height:
-                lower_rows = panel[width:] @ inverse.T
+                lower_rows = trmm(1.0, inverse, panel[width:], side=1, lower=1, trans_a=1)
                 remainder = syrk(
                     -1.0,
                     lower_rows,
@@ -162,7 +162,7 @@ class Fronts:
                     lower=1,
                     overwrite_c=1,
                 )
-                panel[width:] = lower_rows @ inverse
+                panel[width:] = trmm(1.0, inverse, lower_rows, side=1, lower=1)
             remainders.append(remainder)
         return NestedFactors(self, numbers)
 
