@@ -526,6 +526,7 @@ class BubbleKind(BaseKind):
         "swapped",
         "height-falls",
         "height-unit",
+        "not-zeroed",
     )
     read = staticmethod(read)
     prepare = LazyFunction(f"{__name__}.prepared_readings", "prepare")

@@ -148,6 +148,7 @@ class PlausibleReadings:
     min_height: float = 0.01  # largest height: less is a wrong unit, or no test
     max_height: float = 1.0  # a hemisphere, which only soft membranes exceed
     impossible_height: float = 4.0  # a balloon
+    max_height_at_rest: float = 0.02  # over the largest: more is a gauge that was not zeroed
     min_correlation: float = 0.5  # rank correlation of height and pressure
     #: Exponent of the height as a power of the pressure: 1/3 for a flat elastic sheet, 1 for a
     #: tense one; above 1 height and pressure are exchanged.
@@ -169,7 +170,20 @@ def _doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt
     for series in readings.series:
         if series.quantity == "height":
             doubts += _doubts_of_heights(series, test.outline.radius)
+            if test.height_offset is None:
+                doubts += _doubts_of_zero(series)
     return doubts
+
+
+def _doubts_of_zero(series: ReadingSeries) -> Iterator[Doubt]:
+    """Yield a doubt if heights without pressure are not zero."""
+    height = series.at_rest or 0.0
+    if abs(height) > PLAUSIBLE.max_height_at_rest * float(np.abs(series.value).max()):
+        words = (
+            f"the {series.label} is {height:.3g} mm without pressure: all count from the sheet at "
+            "rest; subtract it, or let [bubble.nuisance] height_offset find it"
+        )
+        yield Doubt("not-zeroed", False, words)
 
 
 def _doubts_of_heights(series: ReadingSeries, radius: float) -> Iterator[Doubt]:

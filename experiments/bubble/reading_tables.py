@@ -129,8 +129,21 @@ def _heights(
     for quantity, xy in zip(quantities, places, strict=True) if len(table) else ():
         label = f"{quantity if places.count(xy) > 1 else 'height'} at ({xy[0]:g}, {xy[1]:g}) mm"
         positions = np.tile(xy, (len(table), 1))
-        series.append(_series("height", label, table, quantity, positions))
+        heights = _series("height", label, table, quantity, positions)
+        series.append(replace(heights, at_rest=_height_at_rest(tables, quantity)))
     return [replace(s, moves_with_sheet=section.moves_with_sheet) for s in series]
+
+
+def _height_at_rest(tables: Sequence[pd.DataFrame], quantity: str) -> float | None:
+    """Return the mean height (mm) without pressure before the largest one; None without any."""
+    heights: list[float] = []
+    for table in tables:
+        pressure = table["pressure"].to_numpy(float)
+        before = pressure[: np.argmax(pressure)]
+        is_at_rest = before <= LIMITS.least_pressure * pressure.max()
+        first_loaded = len(before) if is_at_rest.all() else int(np.argmin(is_at_rest))
+        heights += table[quantity].iloc[:first_loaded].tolist()
+    return float(np.mean(heights)) if heights else None
 
 
 def _profiles(

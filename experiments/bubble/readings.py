@@ -88,6 +88,8 @@ class ReadingSeries:
         Unit vector along which a curvature or a strain is measured.
     span : float, mm
         Length over which a curvature or a strain is measured.
+    at_rest : float, mm, or None
+        Mean height that was read without pressure before the first inflation.
     """
 
     quantity: Quantity
@@ -99,6 +101,7 @@ class ReadingSeries:
     moves_with_sheet: bool = False
     direction: tuple[float, float] = (1.0, 0.0)
     span: float = 0.0
+    at_rest: float | None = None
 
     @property
     def unit(self) -> ReadingUnit:

@@ -115,6 +115,7 @@ MISTAKES_WITH_OWN_TESTS = {
     "height-flipped": False,
     "height-falls": True,
     "height-unit": True,
+    "not-zeroed": False,
     "loaded-reference": False,
 }
 BUBBLE_MISTAKES = {

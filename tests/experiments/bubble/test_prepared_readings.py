@@ -97,6 +97,18 @@ def test_doubts_of_heights(heights):
     assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
 
 
+@pytest.mark.parametrize(("offset", "doubt"), [(0.0, []), (0.3, []), (3.0, ["not-zeroed"])])
+def test_gauge_that_was_not_zeroed_is_doubted(heights, offset, doubt):
+    """It reads as much without pressure; what it reads after the inflation tells nothing."""
+    pressures = [0.0, 0.0, *PRESSURES, 0.0]
+    read = np.array([[0.0, 0.0, *heights[0], 5.0]]) + offset
+    keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
+    for nuisance in ({}, {"height_offset": 5.0}):
+        bubble = bf.Bubble.heights(pressures, read, nuisance=nuisance, **keys)
+        names = [found.name for found in prepared_of(bubble).doubts(None)]
+        assert names == (doubt if not nuisance else [])
+
+
 def test_heights_of_the_centre_give_a_modulus_in_closed_form(heights):
     estimate = prepared_of(gauged(heights)).closed_form(LAW)
     assert len(estimate.modulus) == len(PRESSURES)
