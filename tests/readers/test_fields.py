@@ -302,6 +302,11 @@ def test_impossible_surfaces_are_refused():
     found = fit_surface(field, 1)  # four coefficients through four points
     np.testing.assert_allclose(found.evaluate(points), field.displacement, atol=1e-9)
     line = DisplacementField(0.02, np.tile(points[:2], (4, 1)), np.zeros((8, 3)))
+    # Rounding is no second direction: the singular value of it is 1e-14 of the others.
+    place = np.linspace(-50.0, 50.0, 8)[:, None]
+    rounded = place * [0.6, 0.8] + 1e-12 * points[np.arange(8) % 4] / 50.0
+    rounded_line = DisplacementField(0.02, rounded, np.zeros((8, 3)))
+    assert "settle only" in complaint(fit_surface, rounded_line, 1)
     few = DisplacementField(0.02, points[:3], np.zeros((3, 3)))
     for bad, degree, words in (
         (few, 1, "surface of degree 1 at 20 kPa: 4 coefficients need as many points, there are 3"),

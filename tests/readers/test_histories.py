@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers.histories import LoadHistory, find_cycles, pace_of, rest_limit_of
+from bubblefit.readers.histories import LoadHistory, find_cycles, pace_of, passage, rest_limit_of
 
 
 def test_small_cycles_are_found_and_overshoot_is_none():
@@ -15,6 +15,14 @@ def test_small_cycles_are_found_and_overshoot_is_none():
     ])  # fmt: skip
     load += np.random.default_rng(1).normal(0, 0.5, len(load))
     assert [load[c.peak] for c in find_cycles(load)] == pytest.approx([330, 204, 6680], abs=3)
+
+
+def test_passage_is_interpolated_where_the_load_first_crosses_a_level():
+    load, strain = np.array([0.0, 10.0, 30.0, 20.0]), np.array([0.0, 1.0, 2.0, 5.0])
+    assert passage(load, strain, 15.0) == (1, 1.25)
+    assert passage(load[2:], strain[2:], 25.0) == (0, 3.5)
+    row, none = passage(load, strain, 30.1)
+    assert row == -1 and np.isnan(none)
 
 
 def test_pressures_within_the_noise_of_a_log_are_none():

@@ -170,3 +170,17 @@ def test_cells_within_each_other_are_read_to_a_depth_of_sixteen(tmp_path, depth)
     for _ in range(depth):
         (value,) = value
     assert value.tolist() == [[4.0]]
+
+
+@pytest.mark.parametrize(("depth", "content"), [(16, [[4.0]]), (17, None)])
+def test_cells_of_older_files_are_read_to_a_depth_of_sixteen(tmp_path, depth, content):
+    value = np.array([[4.0]])
+    for _ in range(depth):
+        cell = np.empty((1, 1), dtype=object)
+        cell[0, 0] = value
+        value = cell
+    savemat(tmp_path / "a.mat", {"X": value})
+    read = read_variables(tmp_path / "a.mat", ["X"])["X"]
+    for _ in range(depth):
+        (read,) = read
+    assert (read if read is None else read.tolist()) == content

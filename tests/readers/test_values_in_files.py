@@ -66,6 +66,7 @@ def test_ambiguous_values_in_files_are_refused(tmp_path, text, words):
     [
         ("B0001 B0002 B0003", [0, 1, 2], []), ("a b c", [0, 1, 2], []),
         ("i1 i2 i4 i5", [0, 1, 3, 4], ["leave out 1 (3)"]),
+        ("i1 i4 i5 i6", [0, 3, 4, 5], ["leave out 2 (2, 3)"]),
         ("i1 i2 i2b i3", [0, 1, 1, 2], ["come again (2)"]),
         ("s1_12kPa s2_35.5kPa s3_60kPa", [0, 1, 2], []),
         ("c2_00010 c2_00020 c2_00030 c2_00050", [0, 10, 20, 40], ["up by 10", "1 (40)"]),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.reports import bubbles
-from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
+from bubblefit.reports.bubbles import clock_charts, cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import axis_ends
 
 from ..support.charts import check_charts, data, legend, shown
@@ -82,6 +82,20 @@ def test_heights_are_drawn_against_each_other():
     assert [first[0].title, other[0].title] == ["R² = nan", "R² = -3.000"]
     assert first[1].y_label == "modelled − known, mm"
     assert [bubbles._below_one(r) for r in (0.999, 0.9991)] == ["0.999", "1 − 9.0e-04"]
+
+
+def test_frames_that_are_taken_are_marked_at_their_pressures():
+    """Where the log has no pressure, no frame is taken."""
+    times, pressures = np.arange(5.0), np.array([np.nan, 0.01, 0.03, 0.02, np.nan])
+    heights = 100.0 * times
+    log, rises, pairs = clock_charts(times, pressures, heights, np.array([0.019, 0.031])).charts
+    np.testing.assert_allclose(data(log)[0], [times, 1e3 * pressures])
+    np.testing.assert_allclose(data(rises)[0], [times, heights])
+    frames, taken = pairs.series
+    np.testing.assert_allclose(data(pairs)[0], [1e3 * pressures, heights])
+    assert (taken.x, taken.y) == ([20.0, 30.0], [300.0, 200.0])
+    assert (frames.name, taken.name) == ("all frames", "taken")
+    assert frames.colour != taken.colour and taken.hollow and not frames.hollow
 
 
 def still(points):
