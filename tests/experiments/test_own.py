@@ -8,8 +8,9 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
+from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.field_shape import mirrored
-from bubblefit.experiments.own import OwnTest
+from bubblefit.experiments.own import OwnTest, ValuesObjective
 from bubblefit.inference.nuisance_fit import fit_nuisance
 from bubblefit.inference.objective import FunctionObjective
 from bubblefit.materials.card import MaterialCard, read_card
@@ -363,6 +364,15 @@ def test_own_test_is_fitted_beside_a_bubble(tmp_path):
     analyses = [r.analysis for r in seen if isinstance(r, EvaluationRecord)]
     (end,) = [r for r in seen if isinstance(r, StartRecord)]
     assert analyses == list(range(1, end.analyses + 1)) and seen[-1] is end
+
+
+@pytest.mark.parametrize(
+    ("weighting", "unit"), [(Weighting(), 1.0), (Weighting(relative=True, weight=0.5), 40.0)]
+)
+def test_values_weigh_by_the_largest_of_them_among_tests(weighting, unit):
+    objective = ValuesObjective(Pull(), weighting)
+    np.testing.assert_allclose(objective.scale, np.full(9, 3.0 * unit))
+    assert objective.least_noise == pytest.approx(0.2) and objective.noise_is == "assumed"
 
 
 def test_derivative_of_own_closed_form_follows_differences(tmp_path):

@@ -1,10 +1,25 @@
 """inference/comparison.py: a model, its solver and its objective run together."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
+from bubblefit.inference.comparison import WarmStart
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import LAW, TIGHT, two_bubbles
+
+
+def test_warm_start_is_near_by_or_the_same():
+    """A path may change by a fiftieth of its largest value, with derivatives."""
+    start = WarmStart(np.array([1.0, 2.0]), np.array([10.0, -50.0]), np.array([[3.0, 0.0], [0, 9]]))
+    np.testing.assert_allclose(start.guess(np.array([1.3, 2.1])), [10.9, -49.1])
+    assert start.guess(np.array([1.34, 2.0])) is None
+    assert start.guess(np.array([1.0, 1.88])) is None
+    without = replace(start, slope=None)
+    assert without.guess(np.array([1.0, 2.0])) is start.path
+    assert without.guess(np.array([1.0, 2.0 + 1e-9])) is None
 
 
 class Plain:

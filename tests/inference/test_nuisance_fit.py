@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.nuisance_fit import fit_nuisance, notes_of_verdicts, verdicts
+from bubblefit.inference.nuisance_fit import (
+    NuisanceVerdict,
+    fit_nuisance,
+    notes_of_verdicts,
+    verdicts,
+)
 
 from .cases import (
     EVERYTHING,
@@ -70,6 +75,17 @@ def test_prior_of_thickness_adds_to_uncertainty_of_moduli():
     assert "(known to 0.02 mm before)" in thick.words
     known, free = (np.diag(p.covariance)[:12] ** 0.5 / p.best[:12] for p in posteriors)
     np.testing.assert_allclose(known**2, free**2 + (0.02 / 0.8) ** 2, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("value", "half_widths"), [(3.0, (1.96, 1.96)), (1.5, (1.5, 1.96)), (9.0, (1.96, 1.0))]
+)
+def test_band_of_a_parameter_is_cut_at_its_bounds(value, half_widths):
+    verdict = NuisanceVerdict(
+        name="shift", lower=0.0, upper=10.0, unit="mm", value=value, sigma=1.0, correlation={}
+    )
+    assert verdict.half_widths == pytest.approx(half_widths)
+    assert verdict.band == pytest.approx((value - half_widths[0], value + half_widths[1]))
 
 
 def test_verdicts_say_bound_sigma_and_correlation():

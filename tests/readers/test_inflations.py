@@ -46,6 +46,21 @@ def test_line_counts_inflations_with_or_without_their_last_release(branches):
     assert first.line.startswith(f"inflation 1 of {count}, the first loading, is taken; ")
 
 
+def test_height_of_later_inflations_is_told_at_a_few_pressures():
+    """Of seven pressures, every other; the apex rises to twice and thrice the first height."""
+    rising = np.linspace(0.01, 0.07, 7)
+    pressure = np.concatenate([[*rising, *rising[-2::-1], 0.0]] * 3)
+    height = np.repeat([1.0, 2.0, 3.0], 14) * 100.0 * pressure
+    lines = Inflations(pressure, height, "all").lines
+    told = [(number, kilopascals) for number in (2, 3) for kilopascals in (10, 30, 50, 70)]
+    assert lines == [
+        f"inflation {number} at {kilopascals} kPa: apex {number * kilopascals / 10:.4g} mm, "
+        f"{kilopascals / 10:.4g} mm in the first: {(number - 1) * kilopascals / 10:+.2g} mm, "
+        f"{100 * (number - 1):+.2g} %"
+        for number, kilopascals in told
+    ]
+
+
 def test_frame_near_enough_to_a_pressure_is_chosen():
     seen = np.array([0.010, 0.020, 0.050])
     assert choose_frames(seen, [0.011, 0.05])[0] == (0, 2)

@@ -101,22 +101,44 @@ def test_slip_and_drift_are_doubted(tmp_path):
     assert found.histories[1].values[2].loss < 0
 
 
-def slid_history(lost, seated):
+@pytest.mark.parametrize(
+    ("creep", "is_doubted"), [(None, True), (0.0, True), (0.9, True), (1.1, False)]
+)
+def test_drift_is_of_readings_before_the_machine_moves(creep, is_doubted):
+    """The machine's travel changes by a share of 3e-4 of its range over each five readings."""
+    time, load, strain = load_history()
+    rest = np.arange(40)
+    strain = np.r_[1e-5 * rest, strain + 1e-5 * rest[-1]]
+    load = np.r_[np.full(40, load[0]), load]
+    time = 0.5 * np.arange(len(load))
+    travel = None
+    if creep is not None:
+        travel = 5.0 * load / load.max()
+        travel[:40] += creep * 3e-4 * np.ptp(travel) * np.minimum(rest / 5.0, 1.0)
+    history = LoadHistory(Path("rest.csv"), load, strain, time, travel)
+    notes = [str(note) for note in evaluate_history(history).notes if note.kind == DRIFT]
+    assert len(notes) == is_doubted
+    assert all("moves by 2e-05 a second before the load does" in note for note in notes)
+
+
+def slid_history(lost, seated, readings=40, settled=0.0):
     """Return a history of which the extensometer loses strain, and the grips settle in cycle 2.
 
     lost : of the strain at the peak of cycle 2, beside cycle 1. seated : share of the strain by the
-    travel of cycle 3, to a higher load.
+    travel of cycle 3, to a higher load. readings : of the last unloading. settled : mm by which the
+    grips settle up to a sixth of the last peak.
     """
     turns = [(0.0, 0.0), (0.010, 3000.0), (0.004, 50.0), (0.010 * (1 - lost), 3000.0)]
     turns += [(0.0045 - 0.010 * lost, 50.0), (0.016, 6000.0), (0.010, 50.0)]
+    branches = list(zip(pairwise(turns), [40] * 5 + [readings], strict=True))
     strain, load = (
-        np.concatenate([np.linspace(a[k], b[k], 40)[1:] for a, b in pairwise(turns)])
-        for k in (0, 1)
+        np.concatenate([np.linspace(a[k], b[k], n)[1:] for (a, b), n in branches]) for k in (0, 1)
     )
     travel = 300.0 * strain
     third = slice(4 * 39 - 1, 5 * 39)
     rise = travel[third] - travel[third][0]
     travel[third] = travel[third][0] + rise / (1 - seated)
+    travel[third] += settled * np.minimum(load[third] / 1000.0, 1.0)
     travel[third.stop :] += travel[third.stop - 1] - 300.0 * strain[third.stop - 1]
     return evaluate_history(LoadHistory(Path("slid.csv"), load, strain, travel=travel))
 
@@ -134,6 +156,13 @@ def test_slip_is_suspected_beyond_that_of_good_specimens(lost, seated, words):
     notes = [str(note) for note in slid_history(lost, seated).notes if note.kind == SLIP]
     assert len(notes) == (words is not None)
     assert words is None or notes[0].startswith(words)
+
+
+def test_slip_is_judged_from_a_fifth_of_the_peak():
+    (note,) = (note for note in slid_history(0.0, 0.26, readings=6).notes if note.kind == SLIP)
+    assert "the machine's travel makes 0.0125 of strain" in str(note)
+    assert "and the extensometer shows 0.00928" in str(note)
+    assert all(note.kind != SLIP for note in slid_history(0.0, 0.0, settled=3.0).notes)
 
 
 def test_slip_of_measured_straps_and_cords(shared_data):

@@ -90,12 +90,12 @@ def test_hold_gives_creep_per_decade(tmp_path):
 
 def test_stable_cycle_is_the_first_that_repeats(tmp_path):
     several = ((0.004, 0.010, 3000.0), (0.0048, 0.0102, 3000.0), (0.0049, 0.01025, 3000.0),
-               (0.00492, 0.01026, 3000.0))  # fmt: skip
+               (0.00492, 0.01026, 3000.0), (0.00493, 0.010262, 3000.0))  # fmt: skip
     path = write_history(
-        tmp_path / "four.csv", ["time_s,load_N,strain"], load_history(cycles=several)
+        tmp_path / "five.csv", ["time_s,load_N,strain"], load_history(cycles=several)
     )
     assert cycles(path).histories[0].stable_cycle == 4
-    assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned"]
+    assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned", ""]
 
 
 def test_rates_are_those_of_the_ramps_with_a_hold_and_a_clock_of_whole_seconds(tmp_path):

@@ -121,6 +121,7 @@ def test_mistake_in_a_cylinder_section_is_one_line(tmp_path, old, new, words):
     ("before", "after", "field", "words"),
     [
         ("pressure = 80.0", "pressure = 110.0", "cylinder[0].pressure", "60 to 100"),
+        ("pressure = 80.0", "pressure = 59.9", "cylinder[0].pressure", "60 to 100"),
         ("yarn = [1000.0, 2000.0]", "yarn = [1.0]", "cylinder[0].wall.yarn", "expected 2"),
         ("angle = 65.0,", "", "cylinder[0].wall.angle", "braid"),
         ("angle = 65.0", "angle = 50.0", "cylinder[0].wall.angle", "54.7"),

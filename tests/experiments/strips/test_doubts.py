@@ -12,6 +12,7 @@ from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from .cases import ENDS, GAUGE, GOOD_CURVES, THICKNESS, WIDTH, strip_doubts_of, strip_of_curves
 
 A, P, F = "elongation-unit", "preload", "after-failure"
+STILL, AT_LIMIT, SLACK = "gauge-still", "load-limit", "slack-strip"
 #: Elongation, load; where the gauge ends; the doubt and its numbers.
 LIMITS = [
     *(([0.0, 0.5 * end, end], [0, 50, 100], gauge, None, name, f"{end / gauge:.3g} gauge lengths")
@@ -29,6 +30,15 @@ LIMITS = [
     # In the first half of the way it is an early slip, and beyond the end nobody asks.
     ([0.0, 1.0, 2.0, 4.0], [0.0, 100.0, 9.9, 200.0], 20, None, "", ""),
     ([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, 9.9, 20.0], 20, 2.99, "", ""),
+    # The load rises by a fifth over the last two thousandths of the elongation, up to the end.
+    *(([0.0, 2.0, still, 3.999, 4.0, 5.0], [0.0, 50.0, first, 90.0, 100.0, 100.0], 20, 4.0, name,
+       f"rises from {first:.3g} to 100 N while the elongation stands still at 4 mm")
+      for still, first, name in ((3.993, 79.0, STILL), (3.993, 81.0, ""), (3.991, 79.0, ""))),
+    *(([0.0, 2.0, begin, 3.95, 4.0], [0.0, 50.0, first, 100.0, 100.0], 20, None, name,
+       "exactly 100 N in 3 rows, over 3% of")
+      for begin, first, name in ((3.9, 100.0, AT_LIMIT), (3.93, 100.0, ""), (3.9, 99.9, ""))),
+    *(([0.0, begin, 2.0, 4.0], [0.0, load, 50.0, 100.0], 20, None, name, "at 11% of")
+      for begin, load, name in ((0.44, 0.19, SLACK), (0.39, 0.19, ""), (0.44, 0.21, ""))),
 ]  # fmt: skip
 
 

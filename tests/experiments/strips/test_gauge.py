@@ -1,6 +1,7 @@
 """experiments/strips/gauge.py: points followed, and loads paired with frames."""
 
 import logging
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,9 @@ from bubblefit.experiments.strips.gauge import (
     CORRELATION_LOST,
     GaugeRecord,
     GaugeTable,
+    Surface,
     gauge_load_curve,
+    position_on,
     virtual_strain_gauge,
 )
 from bubblefit.notes import Note
@@ -48,6 +51,18 @@ def test_gauge_measures_a_homogeneous_stretch_exactly(stretches, angle, jitter, 
     np.testing.assert_allclose(record.strain, np.array(stretches) - 1, atol=1e-10)
     np.testing.assert_allclose(record.log_strain, np.log(stretches), atol=1e-10)
     assert (record.lost_frames, record.warnings) == ((), ())
+
+
+def test_triangle_of_no_area_holds_no_point():
+    reference = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 2.0]])
+    positions = np.zeros((4, 2, 3))
+    positions[:, 0, :2] = reference
+    positions[:, 1, :2] = 2.0 * reference + 1.0
+    for order in ([0, 1, 2], [0, 2, 3]), ([0, 2, 3], [0, 1, 2]):
+        surface = Surface(SimpleNamespace(simplices=np.array(order)), positions)
+        for x, y in ((1.0, 0.5), (0.5, 0.0)):
+            found = position_on(surface, np.array([x, y]), 9.0)
+            np.testing.assert_allclose(found, [[x, y, 0.0], [2 * x + 1, 2 * y + 1, 0.0]])
 
 
 def test_interpolation_of_the_gauge_is_of_second_order():

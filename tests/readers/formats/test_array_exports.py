@@ -7,9 +7,14 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 from bubblefit.readers import mat_files
 from bubblefit.readers.formats import array_exports as npz_files
-from bubblefit.readers.formats.array_exports import array_names, read_arrays
+from bubblefit.readers.formats.array_exports import (
+    array_names,
+    read_arrays,
+    recognises_vic3d,
+)
 from bubblefit.readers.frames import FrameOptions, read_frames
 from scipy.io import savemat
 
@@ -33,6 +38,16 @@ def test_pickle_is_never_read(tmp_path):
     for name in ("pyaldic", "csv", "vic3d-mat"):
         complaint(read_frames, [path], format=name)
     assert not trace.exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "is_recognised"),
+    [("XYUVW", True), ("XYZUVW", True), ("XYUV", False), ([*"XYUVW", "points3D"], False)],
+)
+def test_heights_are_no_sign_of_a_mat_file_of_vic3d(tmp_path, names, is_recognised):
+    path = tmp_path / "a.mat"
+    savemat(path, {name: np.ones((2, 2)) for name in names})
+    assert recognises_vic3d(path, path.read_bytes()[:520]) is is_recognised
 
 
 ARRAY_PLACES = np.arange(12.0).reshape(4, 3)
