@@ -281,7 +281,7 @@ def converging(control, found=None):
         found(State(self.evaluated, residual, sum(self.contact) if bodies else 0.0))
 
     def full(original):
-        def equilibrium(self, u, pressure):
+        def equilibrium(self, u, pressure, *settings):
             self.tolerance = control.residual
             self.newton = NewtonSettings(chord_below=0.0)
             tangent, last = self.tangent, [np.inf]
@@ -294,7 +294,7 @@ def converging(control, found=None):
 
             tangent.solve = solved
             try:
-                end = original(self, u, pressure)
+                end = original(self, u, pressure, *settings)
             finally:
                 del tangent.solve
             return None if end is None else _corrected(self, end, pressure, last[0], control)
