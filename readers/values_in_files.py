@@ -254,6 +254,9 @@ def number_in_name(
         )
         raise InputError(path, field, problem)
     ((number, name),) = matches
+    if re.search(rf"\d[pe]{re.escape(number)}[ _]?{name}", path.stem, re.IGNORECASE):
+        problem = f"{number} {name} stands behind a letter that may be a decimal mark or a power"
+        raise InputError(path, field, f"{problem}; a pattern with one group says what is meant")
     return parse_number(number) * units[name]
 
 

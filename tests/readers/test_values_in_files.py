@@ -96,6 +96,12 @@ def test_frames_without_picture_numbers(tmp_path):
     assert len(picture_numbers([path], [5.0, 5.0])[1]) == 1
 
 
+def test_ambiguous_number_in_a_name_is_refused():
+    for name in ("12p5kPa.csv", "1E2 kPa.csv"):
+        words = "kPa stands behind a letter that may be a decimal mark or a power; a pattern"
+        complaint_with([name, words], number_in_name, Path(name), PRESSURE_UNITS)
+
+
 @pytest.mark.parametrize(
     ("name", "units", "pattern", "expected"),
     [
@@ -109,6 +115,7 @@ def test_frames_without_picture_numbers(tmp_path):
         ("p3_7x.csv", TIME_UNITS, r"_(\d)", 7.0), ("12max.csv", PRESSURE_UNITS, None, "found none"),
         ("p3_7x.csv", {"s": 1.0, "ms": 1e-3}, None, "with its unit (s, ms)"),
         ("10kPa_0.1bar.csv", PRESSURE_UNITS, None, "10 kPa and 0.1 bar"),
+        ("step3p12.5kPa.csv", PRESSURE_UNITS, r"p([\d.]+)kPa", 12.5e-3),
         ("1s_2ms", {"s": 1.0, "ms": 1e-3}, None, "found 1 s and 2 ms"),
         ("a.csv", PRESSURE_UNITS, r"p(\d+)", "does not fit the pattern"),
         ("px.csv", PRESSURE_UNITS, r"p(\w)", "found 'x'"),
