@@ -371,6 +371,10 @@ class Filling(Loading):
             How often the step may be halved.
         """
         displacement = self.equilibrium(start, level)
+        if displacement is None and self.leaps and self.membrane.wrinkle_stiffness is None:
+            # Smaller steps would follow folds of a stiff wall that come and go.
+            self.membrane.pressure = level
+            displacement = settled(self.membrane, u)
         if displacement is None and halvings == self.max_halvings:
             # Folds of a cap come and go: treat it as slack before trying smaller steps.
             displacement = self.membrane.equilibrium_from_slack(u, level)

@@ -10,6 +10,9 @@ from bubblefit.runs.verification.thin_walls import ISOTROPIC, NU, RADIUS, THICKN
 from bubblefit.runs.verification.thin_walls import MODULUS as E
 from bubblefit.runs.verification.thin_walls import sphere_model as sphere
 from bubblefit.runs.verification.thin_walls import tube_model as tube
+from bubblefit.solvers.membrane import inflation
+from bubblefit.solvers.membrane.closed import ClosedMembrane
+from bubblefit.solvers.membrane.sensitivity import Neighbours
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad
 
@@ -60,6 +63,22 @@ def test_limit_pressure_is_passed_by_volume():
     exact = quad(rigidity, 0, strain)[0]
     assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
     assert min(rigidity(np.linspace(0, strain, 400))) < exact  # there is a limit pressure
+
+
+def test_fold_of_a_stiff_wall_before_its_bending_is_passed_by_a_viscous_motion(monkeypatch):
+    history, membrane = inflate(tube(8, 1, 20.0, [0.01], caps=False))
+    u = history.displacement[-1]
+    pressures = []
+
+    def rest(moving, start):
+        pressures.append(moving.pressure)
+        return start
+
+    monkeypatch.setattr(inflation, "settled", rest)
+    monkeypatch.setattr(ClosedMembrane, "equilibrium", lambda *_: None)
+    filling = inflation.Filling(membrane, Neighbours(membrane, ()), leaps=True)
+    assert filling.reach(0.01, u, 0.02, u, filling.max_halvings) is u
+    assert pressures == [0.02] and not filling.snaps
 
 
 @pytest.mark.parametrize(
