@@ -34,6 +34,15 @@ def test_ends_of_axes_enclose_values():
 
 
 @pytest.mark.parametrize(
+    ("values", "ends"),
+    [([4.0, 4.0], (2.0, 6.0)), ([-8.0], (-12.0, -4.0)), ([0.0], (0.0, 0.5)), ([1, 3], (0.9, 3.1))],
+)
+def test_axis_of_equal_values_goes_half_of_them_beyond(values, ends):
+    chart = Chart("t", "x", "y", [line("a", np.arange(len(values)), values)], y_range=None)
+    assert axis_ends(chart)[1] == pytest.approx(ends)
+
+
+@pytest.mark.parametrize(
     ("values", "wanted"),
     [([1.0, 10.0], False), ([1.0, 10.1], True), ([0.0, 50.0], False), ([-1.0, 50.0], False),
      ([np.nan, 1.0, np.inf, 11.0], True), ([np.nan], False), ([], False), ([[1.0], [11.0]], True)],
@@ -90,6 +99,8 @@ def test_sigma_of_each_test_is_drawn_over_strain():
     check_charts(charts)
     warp, _, shear = charts.charts
     assert lines(warp, "bubble")[0][1] == pytest.approx(30.0)
+    assert lines(warp, "bubble")[0][0] == pytest.approx(100 * STRAINS[0], rel=1e-5)
+    assert lines(shear, "both")[0][0] == pytest.approx(100 * STRAINS[2], rel=1e-5)
     assert [s.name for s in warp.series] == ["bubble", "both"] and warp.level is None
     assert named(shear)["bubble"].y == [None] * 20 and shear.level == 100.0
     mark = named(shear)["bubble, not determined"]

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.reports.charts import Chart, Charts, line
-from bubblefit.reports.content import PageSection, Report, Table, read_page_data, round_trip
+from bubblefit.reports.content import (
+    Exhibit,
+    Facts,
+    PageSection,
+    Picture,
+    Report,
+    Table,
+    Words,
+    read_page_data,
+    round_trip,
+)
 from bubblefit.reports.html import write_page, write_report
 
 from ..builders.pages import full_report
@@ -36,6 +46,17 @@ def test_columns_without_a_value_are_left_out():
     shown = table.without_empty_columns()
     assert shown.header == ["test", "notes", "ended"] and shown.text == [2]
     assert shown.rows == [["a", 0, "x"], ["b", None, "y"]]
+
+
+def test_parts_of_an_exhibit_begin_with_facts_below_its_title():
+    table, words = Table("T", ["a"], [[1]]), Words(["b"])
+    exhibit = Exhibit([("radius", 100)], [("a.png", "c")], [table], parts=[words])
+    for title in ("", "one"):
+        facts, *others = exhibit.all_parts(title)
+        assert facts == Facts([("radius", 100)], title)
+        assert others == [words, Picture("a.png", "c"), table]
+    assert Exhibit(parts=[words]).all_parts() == [words]
+    assert Exhibit().all_parts("one") == [Facts((), "one")]
 
 
 def test_data_of_page_are_strict_json(full, tmp_path):

@@ -1,6 +1,7 @@
 """The page of a fit: facts, tables, figures, warnings and files, each as reckoned here."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
@@ -337,6 +338,20 @@ def test_page_of_one_test_shows_its_rms_error(one_strip_fit, told, tmp_path, mon
     assert (
         "weights" not in one_strip_fit.result and "mean_relative_error" not in one_strip_fit.result
     )
+
+
+def test_errors_of_moduli_are_told_with_their_range_of_strain():
+    result = {
+        "moduli_error": {"E1": 0.0123, "G12": 0.2},
+        "moduli_error_range": {"E1": [0.0, 0.05], "G12": [0.001, 0.1]},
+    }
+    (table,) = page._error_tables(SimpleNamespace(result=result))
+    assert table.header[2:] == ["from strain, %", "to strain, %"]
+    assert table.rows == [
+        ["E1", "1.2 %", 0.0, pytest.approx(5.0)],
+        ["G12", "20 %", pytest.approx(0.1), pytest.approx(10.0)],
+    ]
+    assert page._error_tables(SimpleNamespace(result={})) == []
 
 
 def test_charts_of_an_isotropic_law_show_one_modulus():

@@ -5,11 +5,12 @@ import hashlib
 import os
 import re
 from html.parser import HTMLParser
+from io import BytesIO
 
 import pytest
 from bubblefit.errors import InputError, OutputError
 from bubblefit.reports.content import PageSection, Picture, Report, Table
-from bubblefit.reports.html import folds, number, percent, write_page, write_report
+from bubblefit.reports.html import data_uri, folds, number, percent, write_page, write_report
 from bubblefit.storage.writing import replacing
 from PIL import Image
 
@@ -66,6 +67,15 @@ def test_page_holds_everything_it_shows(full, tmp_path):
     assert ">Nothing<" not in page and "<so>" not in page
     card = re.search(r'href="data:application/octet-stream;base64,(.*?)"', page)
     assert base64.b64decode(card[1]).decode() == "a = 'é'\n"
+
+
+@pytest.mark.parametrize(("size", "shrunk"), [((30, 20), (30, 20)), ((60, 30), (40, 20))])
+def test_wide_picture_is_shrunk_in_proportion(tmp_path, size, shrunk):
+    Image.new("RGB", size, "red").save(tmp_path / "a.png")
+    head, data = data_uri(tmp_path, "a.png", max_width=40).split(",")
+    assert head == "data:image/png;base64"
+    with Image.open(BytesIO(base64.b64decode(data))) as picture:
+        assert picture.size == shrunk and picture.convert("RGB").getpixel((9, 9)) == (255, 0, 0)
 
 
 def test_missing_picture_is_named(tmp_path):

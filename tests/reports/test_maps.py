@@ -77,6 +77,20 @@ def test_surface_is_drawn_from_front_and_above():
     assert svg.count('fill="#999"') == 1 and svg.count('stroke="#440154"') == 1
 
 
+def test_surface_shows_its_first_quantity_at_the_last_load():
+    corners = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]] * 2, float)
+    shades = [
+        maps.Panel("stress", "N/mm", pack([[1.0], [5.0]])),
+        maps.Panel("strain", "%", pack([[7.0], [9.0]])),
+    ]
+    surface = maps.Solid("n", ["1", "2"], "p", pack(corners), pack([[0, 1, 2, 3]]), shades, "c")
+    spec = maps.solid_view(surface)
+    (legend,) = spec["legends"]
+    assert legend["title"] == "stress, N/mm"
+    assert {s["name"]: s.get("value") for s in spec["signals"]}["ends"] == pytest.approx([1.0, 5.0])
+    assert "5.0" in str(spec["data"]) and "9.0" not in str(spec["data"])
+
+
 def test_vtu_file_holds_the_deformed_mesh(tmp_path):
     points = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], dtype=float)
     mesh = Mesh(points, np.array([[0, 1, 2, 3]]), {"rim": np.arange(4)})

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.forward import Simulation
+from bubblefit.materials.forms.base import form_named
 from bubblefit.notes import Verdict
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Chart, Charts, axis_ends
@@ -119,6 +120,40 @@ def test_ratios_are_drawn_over_nu12():
     assert [(s.lower, s.upper) for s in first.series[1:4:2]] == [([90], [110]), ([57], [63])]
     assert first.series[1].x == [1.0] and [s.y for s in shear.series] == 3 * [[0.01, 0.02, 0.03]]
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
+
+
+def test_errors_of_tests_left_out_are_drawn_beside_those_of_the_fit():
+    """A law of which no test was fitted has its predictions alone."""
+    table = pd.DataFrame({
+        "law": ["a", "a", "card", "card"], "test": ["one", "two"] * 2,
+        "foretold_relative": [0.03, 0.04, 0.05, np.nan],
+        "fitted_relative": [0.01, 0.02, np.nan, np.nan],
+    })  # fmt: skip
+    (chart,) = study_pages.held_out_charts(SimpleNamespace(table=lambda: table), "c").charts
+    assert {name: series.x for name, series in named(chart).items()} == {
+        "a, predicted": pytest.approx([3.0, 4.0]),
+        "card, predicted": [pytest.approx(5.0), None],
+        "a, fitted": pytest.approx([1.0, 2.0]),
+    }
+    assert list(chart.y_names) == ["one", "two"]
+
+
+def test_percentiles_of_a_bootstrap_are_drawn_over_strain():
+    strain, best = np.array([0.0, 0.02]), np.array([100.0, 110.0])
+    names = ("E1", "E2", "G12")
+    fit = SimpleNamespace(value=best, lower=best - 9.0, upper=best + 9.0)
+    form = form_named("constant", {}, [0.1] * 3)
+    study = SimpleNamespace(
+        strains=dict.fromkeys(names, strain), of_fit=dict.fromkeys(names, fit),
+        bands=dict.fromkeys(names, (best - 5.0, best + 4.0)),
+        optimum=SimpleNamespace(best=SimpleNamespace(law=SimpleNamespace(form=form))),
+    )  # fmt: skip
+    for chart in study_pages.bootstrap_charts(study, "c").charts:
+        of_fit, low, high = chart.series
+        assert [series.x for series in chart.series] == [[0.0, 2.0]] * 3
+        assert (of_fit.y, of_fit.lower, of_fit.upper) == ([100, 110], [91, 101], [109, 119])
+        assert (low.y, high.y) == ([95, 105], [104, 114])
+        assert chart.alt.endswith("at rest 100 MPa, samples 95 to 104 MPa")
 
 
 class Thicknesses(Presented):

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from bubblefit.errors import InputError
 from bubblefit.reports import charts as declared
 from bubblefit.reports import vega
@@ -34,6 +35,26 @@ def test_every_value_is_given_to_vega():
     assert [axis["title"] for axis in spec["axes"]] == ["x, mm", "y, N"]
     legend = {scale["name"]: scale for scale in spec["scales"]}["legend-shape"]
     assert (legend["domain"], legend["range"]) == (["a", "b"], ["stroke", "circle"])
+
+
+def test_lines_are_solid_unless_they_say_so():
+    series = [
+        line("a", [0, 1], [0, 1]),
+        *(line(f"{n}", [0, 1], [0, 1], dashes=n) for n in range(9)),
+    ]
+    spec = panel(Chart("", "x", "y", series))
+    drawn = [mark["encode"]["update"]["strokeDash"]["value"] for mark in spec["marks"]]
+    assert drawn[:2] == [[], []] and drawn[1:5] == drawn[5:9] == list(vega.DASHES)
+    legend = {scale["name"]: scale for scale in spec["scales"]}["legend-strokeDash"]
+    assert legend["range"] == drawn
+
+
+@pytest.mark.parametrize(("letters", "columns"), [(1, 9), (10, 4), (20, 2), (50, 1), (80, 1)])
+def test_columns_of_a_legend_fit_in_the_width_of_the_chart(letters, columns):
+    """A letter takes 6.2 pixels, the sample beside a name 34, in a chart of 386."""
+    series = [line(name * letters, [0, 1], [0, 1]) for name in "abc"]
+    (legend,) = panel(Chart("", "x", "y", series), 386)["legends"]
+    assert legend["columns"] == columns and legend["labelLimit"] == 352
 
 
 def test_charts_are_saved_by_suffix_and_refused_otherwise(tmp_path):

@@ -89,6 +89,8 @@ def test_frames_are_drawn_again(project, tmp_path):
     found = module.find_optimum(bubble, card, None)
     (group,) = module.groups_of(found, "frames")
     assert [u.name.split(": ")[-1] for u in group.units] == ["22 kPa", "40 kPa", "59 kPa"]
+    words = "--over: no kind has two tests or more"
+    raised(InputError, words, module.groups_of, found, "tests")
     problem = found.problem
     norms = problem.blocks.norms(found.point.residual).reshape(3, 3).sum(axis=1)
     factors = module.factors_of(problem, [group], [[2, 0, 1]])

@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
+import pytest
 from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.check import NOTHING, expected_of
+from bubblefit.runs.check import NOTHING, PredictionCheck, expected_of
 
 from ..builders.projects import constant_strips
 
@@ -31,6 +32,21 @@ def test_expected_moduli_follow_from_bounds():
         np.testing.assert_allclose(soft[name], (LEAST[name], 0.5 * value))
     none = expected(LawBounds(LEAST, None, -upper, -lower))
     assert none == {name: (least, least) for name, least in LEAST.items()}
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [(0, ""), (1, " and 1 file with measured loads"), (3, " and 3 files with measured loads")],
+)
+def test_files_of_tests_that_are_predicted_are_counted(count, words):
+    file = SimpleNamespace(dropped={"incomplete": 2}, source=SimpleNamespace(notes=["N, not kN"]))
+    test = SimpleNamespace(name="bent", data_files=lambda: [file] * count, seen=["a choice"])
+    (row, *notes) = PredictionCheck(None, (test,)).rows()
+    text = f"its section and its models{words} were read; it is predicted, not fitted"
+    assert row == ("bent", "fine", "", text)
+    left_out = ["N, not kN", f"rows of the files left out: {2 * count} incomplete"]
+    expected = [*left_out * bool(count), "a choice"]
+    assert notes == [("bent", "note", "", words) for words in expected]
 
 
 def test_each_test_has_a_row_in_what_a_check_shows(tmp_path):

@@ -1,6 +1,7 @@
 """Starts coarse to fine: groups of one optimum, interruption, agreement of starts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
@@ -176,6 +177,13 @@ def test_optima_differ_by_moduli_and_by_objective(fitted):
     # Moduli are compared up to what either optimum reached.
     a, b = ended(fitted, 0, 0.1), ended(fitted, 1, 0.1, (80.0, 400.0, 816.0))
     assert moduli_difference(fitted.problem, b, a) == pytest.approx(0.02)
+
+
+def test_optima_without_a_law_differ_by_shares_of_their_bounds():
+    bounds = np.array([1.0, -10.0]), np.array([3.0, 10.0])
+    unknowns = SimpleNamespace(size=0, nuisance=SimpleNamespace(bounds=bounds))
+    a, b = (SimpleNamespace(unknowns=values) for values in ((1.5, 4.0), (1.6, 1.0)))
+    assert moduli_difference(SimpleNamespace(unknowns=unknowns), a, b) == pytest.approx(3 / 20)
 
 
 def test_next_start_of_group_continues_where_first_fails(fitted, monkeypatch):

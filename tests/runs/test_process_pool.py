@@ -6,6 +6,7 @@ import os
 import signal
 import struct
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.runs import process_pool
 from bubblefit.runs.executor import Executor
 from bubblefit.runs.process_pool import ProcessPool
 from bubblefit.runs.starts import StartRecord
@@ -81,6 +83,21 @@ def test_jobs_and_their_order_do_not_change_a_start():
     assert all(value < 1e-6 for value, _, _ in alone.values())
     assert study_with(2, [3, 0, 1, 2]) == alone
     assert study_with(1, [2])[2] == alone[2]
+
+
+@pytest.mark.parametrize(
+    ("jobs", "tasks", "shares"), [(1, 4, (1, 1)), (4, 9, (4, 1)), (5, 2, (2, 2)), (3, 0, (1, 3))]
+)
+def test_tasks_fewer_than_jobs_share_the_processes(monkeypatch, jobs, tasks, shares):
+    given = []
+
+    def worker(context, prepare, *numbers):
+        given.append(numbers)
+        return SimpleNamespace(give=lambda number: None)
+
+    monkeypatch.setattr(process_pool, "Worker", worker)
+    ProcessPool(build, range(tasks), jobs, "starts").start_worker()
+    assert given == [shares] and all(isinstance(number, int) for number in given[0])
 
 
 def test_death_of_a_process_is_noticed():
