@@ -9,10 +9,10 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from html import escape
 from math import prod
 from pathlib import Path
 from typing import Any, Literal
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -515,7 +515,7 @@ def write_pvd(path: Path, files: Sequence[tuple[float, Path]]) -> Path:
     """
     rows = [
         f'    <DataSet timestep="{time:.9g}" part="0" '
-        f"file={quoteattr(file.relative_to(path.parent).as_posix())}/>\n"
+        f'file="{escape(file.relative_to(path.parent).as_posix())}"/>\n'
         for time, file in files
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
