@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ from ..readers.machine_tables import (
     read_times,
 )
 from ..readers.quantities import DIRECTION_ALIASES, FILL, WARP, columns_of
-from ..readers.tables import NUMBER, UTF_16_MARKS, parse_number
+from ..readers.tables import NUMBER, UTF_16_MARKS, decimal_mark, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS, split_unit
 from ..readers.values_in_files import number_in_name, values_in_file
 from .sections import Settings
@@ -191,6 +191,24 @@ class GaugedBubble:
             self.keys[key] = unit
             self.remarks[key] = "assumed, as a heading names no unit"
 
+    def with_decimal(self, table: MachineTable, columns: Sequence[str]) -> MachineTable:
+        """Return a table with the decimal mark of columns.
+
+        Commas are assumed to be decimal ones where all of them may mark thousands as well.
+        """
+        texts = table.table
+        cells = [
+            (line, name, cell)
+            for name in columns
+            for line, cell in zip(texts.lines.tolist(), texts.text(name), strict=True)
+        ]
+        try:
+            decimal = decimal_mark(texts.path, cells)
+        except InputError:
+            decimal = self.keys["decimal"] = ","
+            self.remarks["decimal"] = 'assumed; or "." if commas mark thousands'
+        return replace(table, table=replace(texts, decimal=decimal))
+
 
 def read_heights(file: Path) -> GaugedBubble:
     """Recognise a table of pressure and height at one place or several; raise InputError."""
@@ -208,6 +226,7 @@ def read_heights(file: Path) -> GaugedBubble:
         gauges.keys["columns"] = {"height": heights}
     gauges.add_unit("pressure_unit", table, [pressure], "kPa")
     gauges.add_unit("length_unit", table, heights, "mm")
+    gauges.with_decimal(table, [pressure, *heights])
     return gauges
 
 
@@ -250,6 +269,7 @@ def read_profiles(file: Path) -> GaugedBubble:
     profiles = GaugedBubble("profiles", has_pressure=bool(pressures))
     profiles.add_unit("pressure_unit", table, [table.names[i] for i in pressures], "kPa")
     profiles.add_unit("length_unit", table, [coordinate, height], "mm")
+    profiles.with_decimal(table, [coordinate, height, *(table.names[i] for i in pressures)])
     return profiles
 
 
@@ -266,7 +286,9 @@ def read_apex(file: Path) -> GaugedBubble:
     if not columns:
         raise InputError(file, f"line {table.header}", "no curvature or strain along warp or fill")
     apex = GaugedBubble("apex", {"columns": columns})
-    apex.add_unit("pressure_unit", table, [table.column("pressure")], "kPa")
+    pressure = table.column("pressure")
+    table = apex.with_decimal(table, [pressure, *columns.values()])
+    apex.add_unit("pressure_unit", table, [pressure], "kPa")
     curvatures = [name for key, name in columns.items() if key.startswith("curvature")]
     if curvatures:
         _add_curvatures(apex, table, curvatures)

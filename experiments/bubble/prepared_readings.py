@@ -192,7 +192,10 @@ def _doubts_of_heights(series: ReadingSeries, radius: float) -> Iterator[Doubt]:
     pressure = series.pressure
     share = highest / radius
     largest = f"the {series.label} is {highest:.4g} mm at most, {share:.2g} of the radius"
-    if highest <= 0 or np.corrcoef(pressure, series.value)[0, 1] < -PLAUSIBLE.min_correlation:
+    correlation = 0.0
+    if np.ptp(pressure) * np.ptp(series.value) > 0:  # not so of a single reading
+        correlation = np.corrcoef(pressure, series.value)[0, 1]
+    if highest <= 0 or correlation < -PLAUSIBLE.min_correlation:
         words = f"the {series.label} falls with the pressure: turn its sign, or exchange columns"
         yield Doubt("height-falls", True, words)
         return

@@ -369,7 +369,10 @@ def _read_table(
     if heights:
         named["height"] = heights[0]
     needed = tuple(dict.fromkeys(name.partition(" ")[0] for name in quantities))
-    options = TableOptions(named, needed, section.comment, section.decimal, section.sheet)
+    # The decimal mark is that of all columns that are read.
+    further = {f"height {k}": name for k, name in enumerate(heights[1:], start=2)}
+    columns = named | further
+    options = TableOptions(columns, needed, section.comment, section.decimal, section.sheet)
     table = read_machine_table(path, options, section.format)
     gauges = [name for name in quantities if name.startswith("height ")]
     headings = _gauge_columns(table, gauges, heights) if gauges else {}

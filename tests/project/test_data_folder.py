@@ -219,6 +219,18 @@ def test_what_headings_do_not_tell_is_a_remark(tmp_path):
     assert gauges.keys["columns"] == {"height": ["height left", "height right"]}
 
 
+def test_commas_before_three_digits_are_taken_for_decimal_ones(tmp_path):
+    path = tmp_path / "h.csv"
+    path.write_text("Druck [kPa];Scheitel [mm];Kette 50 [mm]\n20;11;8,381\n40;14;10,617\n")
+    gauges = read_heights(path)
+    assert gauges.keys["decimal"] == "," and "thousands" in gauges.remarks["decimal"]
+    heading = "Druck [kPa];Radius Kette [mm];Dehnung Kette [%]"
+    path.write_text(f"{heading}\n20;491,5;0,77\n40;391,2;1,2\n")
+    apex = read_apex(path)
+    assert apex.keys["columns"]["strain_warp"] == "Dehnung Kette [%]"
+    assert "decimal" not in apex.keys
+
+
 def test_gauge_pressure_is_no_height(tmp_path):
     with pytest.raises(InputError, match="no column of heights"):
         read_heights(table(tmp_path, "time (s),gauge pressure (kPa)"))

@@ -1,5 +1,6 @@
 """experiments/bubble/prepared_readings.py: comparisons with readings, and doubts about them."""
 
+import warnings
 from dataclasses import replace
 
 import bubblefit as bf
@@ -95,6 +96,9 @@ def test_doubts_of_heights(heights):
         value = 20.0 + correlation * rising + across
         assert ("height-falls" in doubt_names(value=value)) is doubt
     assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert doubt_names(value=apex[:1], pressure=np.array(PRESSURES[:1])) == []
 
 
 @pytest.mark.parametrize(("offset", "doubt"), [(0.0, []), (0.3, []), (3.0, ["not-zeroed"])])

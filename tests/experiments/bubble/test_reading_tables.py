@@ -71,6 +71,15 @@ def test_workbook_with_two_gauges_and_two_specimens(tmp_path):
     assert half.positions[0].tolist() == [50.0, 0.0]
 
 
+def test_decimal_mark_is_that_of_all_gauges(tmp_path):
+    rows = "".join(f"{p:g};{h:.0f};{0.75 * h:.2f}\n" for p, h in zip(KILO, RISE, strict=True))
+    (tmp_path / "h.csv").write_text("p [kPa];h [mm];x 50 [mm]\n" + rows.replace(".", ","))
+    keys = 'files = ["h.csv"]\nplaces = [[0, 0], [50, 0]]\n'
+    keys += 'columns = { height = ["h [mm]", "x 50 [mm]"] }\n'
+    _, half = bubble_of(tmp_path, HEIGHTS + keys).data.series
+    np.testing.assert_allclose(half.value, 0.75 * RISE, atol=0.006)
+
+
 def test_specimen_named_in_its_first_row_only_is_refused(tmp_path):
     book = openpyxl.Workbook()
     book.active.append(["specimen", "pressure (kPa)", "height (mm)"])
