@@ -1,18 +1,21 @@
 """runs/fit.py: fits as a whole, and a loaded reference picture beside a sheet at rest."""
 
 import re
+from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.experiments.base import Alternative
 from bubblefit.experiments.bubble.frame_doubts import LOADED_REFERENCE
+from bubblefit.inference.noise import Misfit
 from bubblefit.materials.card import read_card
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.reports.content import read_page_data
 from bubblefit.reports.maps import Maps, Solid
-from bubblefit.runs.fit import NOT_BETTER
+from bubblefit.runs.fit import NOT_BETTER, AlternativeFit, AlternativeFits
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -153,6 +156,26 @@ def fit_with_slack(*, tension=0.0, is_loaded=False):
         mesh_error="told",
         trust=["loaded-reference"],
     )
+
+
+@pytest.mark.parametrize(
+    ("rms", "kind", "words"),
+    [
+        (0.97, LOADED_REFERENCE, "the former explains the data better"),
+        (0.99, NOT_BETTER, "the data do not tell the two apart"),
+        (1.01, NOT_BETTER, "the data do not tell the two apart"),
+        (1.03, NOT_BETTER, "the latter explains the data better"),
+    ],
+)
+def test_misfits_within_two_percent_do_not_tell_alternatives_apart(rms, kind, words):
+    alternative = Alternative("under {:.3g} kPa", "at rest", 3.0, 9.0, None, LOADED_REFERENCE)
+    setup = SimpleNamespace(tests=[SimpleNamespace(test=SimpleNamespace(name="bubble"))])
+    fits = AlternativeFits(setup, 0, alternative, None)
+    assert fits.notes(Misfit(0.02, 0.01, "given", "mm")) == ()
+    fits.best = AlternativeFit(3.0, None, Misfit(0.02 * rms, 0.01, "given", "mm"))
+    (note,) = fits.notes(Misfit(0.02, 0.01, "given", "mm"))
+    assert (note.kind, note.of) == (kind, "bubble")
+    assert note == f"under 3 kPa leaves {0.02 * rms:.3g} mm RMS, at rest 0.02 mm: {words}"
 
 
 def test_reference_picture_under_pressure_is_tried_and_its_misfit_told():

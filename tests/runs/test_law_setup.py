@@ -23,6 +23,16 @@ def test_unknown_thickness_is_in_units_of_file(tmp_path):
     assert (thickness.start, thickness.prior) == pytest.approx((0.8, 0.03))
 
 
+def test_memory_is_none_given_or_fitted_for_each_strain(tmp_path):
+    memory = '[law.memory]\nwarp = "fitted"\nfill = { unloading = 1.2, permanent_set = 0.1 }\n'
+    read = project(tmp_path, "nu12 = {}", ("[law.bounds]", f"{memory}[law.bounds]"))
+    law = fit_setup(read).law
+    assert law.memory.permanent_set == (0.3, 0.1, 0.0)
+    assert law.memory.unloading == (1.4, 1.2, 1.0)
+    assert law.memory.reloading == (1.15, 1.0, 1.0)
+    assert law.memory.saturation == (1.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("unknowns", "key", "words"),
     [

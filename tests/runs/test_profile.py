@@ -68,6 +68,9 @@ def test_uneven_profile_is_put_in_words():
     root = np.sqrt(THRESHOLD)
     assert one.ends == pytest.approx((10 - root, 10 + 2 * root), rel=0.01)
     assert one.asymmetry == pytest.approx(2.0)
+    at_best = ProfileSide((10.0, 10.0), (0.0, 9.0), "", 2)
+    for sides in ({"lower_side": at_best}, {"upper_side": at_best}):
+        assert replace(one, **sides).asymmetry is None
     assert one.words.endswith("; asymmetric: 1.96 below, 3.92 above")
     better = replace(one, upper_side=ProfileSide((10.0, 12.0), (0.0, -3.0), "bound", 2))
     assert {note.kind for note in better.notes} == {NOT_THE_CARD, NOT_CLOSED}
