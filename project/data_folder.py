@@ -60,12 +60,15 @@ BENDING = "loads and deflections of a bent cylinder"
 
 TIMES = "times of the pictures"
 
-#: Words by which heads of exports name the sizes of a specimen.
+#: Words by which heads of exports name the sizes of a specimen, not those of grips or a coating.
 SIZES = {
-    "width": r"width|breite|largeur",
+    "width": (
+        r"(?<!grip[ _])(?<!jaw[ _])(?<!clamp[ _])width(?! of (?:the )?(?:grip|jaw|clamp))"
+        r"|(?<!backen)breite|largeur(?! des? m)"
+    ),
     "gauge_length": r"gau?ge[ _]length|messl[äa]nge|longueur de (?:r[ée]f[ée]rence|mesure)",
     "grip_distance": r"grip[ _](?:distance|separation)|einspannl[äa]nge|entre m(?:ors|[âa]choires)",
-    "thickness": r"thickness|dicke|[ée]paisseur",
+    "thickness": r"(?<!coating[ _])thickness|(?<!schichtungs)(?<!schicht)dicke|[ée]paisseur(?! d)",
 }
 
 #: Units with which files that name none are looked at; a project asks for theirs.

@@ -150,6 +150,22 @@ def test_speeds_are_no_sizes(tmp_path):
     assert strips_with_heads(tmp_path / "rate", rate)["in_heads"] == {}
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Grip width: 60 mm\nCoating thickness: 0.2 mm",
+        "Klemmbackenbreite;60 mm\nBeschichtungsdicke;0,2 mm",
+        "Largeur des mors: 60 mm\nÉpaisseur de l'enduction: 0,2 mm",
+        "Width of the jaws: 60 mm\nSchichtdicke: 0,2 mm",
+    ],
+)
+def test_sizes_of_grips_and_coatings_are_none_of_the_specimen(tmp_path, head):
+    assert strips_with_heads(tmp_path / "none", {"warp1.csv": head})["in_heads"] == {}
+    head += "\nSpecimen width: 50 mm\nDicke: 0,8 mm"
+    test = strips_with_heads(tmp_path / "both", {"warp1.csv": head})
+    assert test["in_heads"] == {"width": 50.0, "thickness": 0.8}
+
+
 def test_size_that_differs_within_a_group_stays_open(tmp_path):
     heads = {f"warp_{w}.csv": f"Width: {w} mm\nGauge length: 100 mm" for w in (25, 30)}
     test = strips_with_heads(tmp_path, heads)
