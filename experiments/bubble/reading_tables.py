@@ -78,6 +78,9 @@ def read_readings(section: BubbleSection, place: Place) -> GaugeReadings | None:
         series += _apex(data.apex, place, section.inflation, files, span)
         for quantity, level in data.apex.noise_of.items():
             noise[quantity] = level
+    if place.need_data and not series:
+        problem = "no reading is at a pressure above zero: reverse the sign, or exchange columns"
+        raise place.error("data", problem)
     is_within = [outline.share(s.positions) < 1.0 for s in series]
     for s, rows in zip(series, is_within, strict=True):
         if not rows.any():

@@ -71,6 +71,12 @@ def test_workbook_with_two_gauges_and_two_specimens(tmp_path):
     assert half.positions[0].tolist() == [50.0, 0.0]
 
 
+def test_pressures_below_zero_are_named(tmp_path):
+    (tmp_path / "h.csv").write_text("p (kPa),h (mm)\n-10,9.6\n-40,15.3\n")
+    said = refusal(tmp_path, HEIGHTS + 'files = ["h.csv"]\n')
+    assert "bubble[0].data: no reading is at a pressure above zero" in said
+
+
 def test_decimal_mark_is_that_of_all_gauges(tmp_path):
     rows = "".join(f"{p:g};{h:.0f};{0.75 * h:.2f}\n" for p, h in zip(KILO, RISE, strict=True))
     (tmp_path / "h.csv").write_text("p [kPa];h [mm];x 50 [mm]\n" + rows.replace(".", ","))
