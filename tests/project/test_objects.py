@@ -140,6 +140,17 @@ def round_trip(project, folder, **how):
     return made, again
 
 
+def test_arrays_of_a_project_file_are_in_a_folder_beside_it(tmp_path):
+    curve = ELONGATION, 5e3 * np.log1p(ELONGATION / 20)
+    law = bf.Law("constant", strain_range=[0.12, 0.14, 0.1])
+    project = bf.Project.of(bf.Strips({"warp": curve}, gauge=20), law, fabric=FABRIC)
+    path = project.to_toml(tmp_path / "again.toml")
+    (file,) = (tmp_path / "again-data").iterdir()
+    assert f"again-data/{file.name}" in path.read_text()
+    elongation, load = bf.read_project(path).tests["strips"].strips["warp"].points
+    np.testing.assert_allclose([elongation, load], curve)
+
+
 ALONE = sorted(
     str(file.relative_to(EXAMPLES))
     for file in EXAMPLES.glob("*/*.toml")

@@ -196,6 +196,19 @@ def test_worker_of_another_version_is_not_used(scheduler, monkeypatch):
         assert sum("is not used" in one.words for one in heard) == 2
 
 
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (("3.12.1", "1.0", "a"), ""),
+        (("3.11.9", "1.0", "a"), "Python 3.11.9, here it is 3.12.1"),
+        (("3.12.1", "0.9", "b"), "bubblefit 0.9, here it is 1.0, another code of bubblefit"),
+        (ImportError("none\nat all"), "no bubblefit of this version (ImportError: none"),
+    ],
+)
+def test_versions_of_a_worker_are_told_beside_those_here(answer, words):
+    assert executor.differences(answer, ("3.12.1", "1.0", "a")) == words
+
+
 def test_late_workers_are_waited_for_and_used():
     heard = []
     with local_cluster(n_workers=0, processes=False) as local, hearing(heard.append):
