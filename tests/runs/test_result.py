@@ -1,6 +1,7 @@
 """The result of a fit: moduli, card, tables, laws drawn within the band, drawings, exports."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
@@ -10,8 +11,9 @@ from bubblefit.errors import InputError, OutputError
 from bubblefit.materials.card import write_card
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports.presenter import page_presenter_of
-from bubblefit.runs.result import COMPARED
+from bubblefit.runs.result import COMPARED, TOGETHER, notes_of_pinned
 from bubblefit.runs.verdict import answers
+from bubblefit.version import __version__
 
 from ..support.commands import in_process, result_in
 from ..support.paths import ROOT
@@ -85,6 +87,48 @@ def test_card_is_valid_up_to_strains_reached(fitted):
     expected = np.minimum(reached, fitted.law.strain_range)
     assert fitted.card.law.strain_range == pytest.approx(expected)
     assert list(fitted.result["valid_strain"].values()) == pytest.approx(expected.tolist())
+
+
+def test_card_says_by_which_fit_it_was_made(fitted, strips_fit):
+    for fit, kind in ((fitted, "bubble"), (strips_fit, "strips")):
+        qualities = {name: findings.quality for name, findings in fit.findings.items()}
+        words = ", ".join(f"{name}: {quality}" for name, quality in qualities.items())
+        if kind == "bubble":
+            (words,) = qualities.values()
+        taken_out = ", error of the mesh taken out" * bool(fit.best.certainty.taken_out)
+        assert fit.card.source == (
+            f"bubblefit {__version__} {kind}, {fit.project.path.name}, "
+            f"objective {fit.objective:.4g}, {words}{taken_out}"
+        )
+    both = SimpleNamespace(
+        setup=SimpleNamespace(tests=[*fitted.setup.tests, *strips_fit.setup.tests])
+    )
+    assert type(fitted).command.fget(both) == "fit"
+
+
+def test_all_tests_and_quantities_together_have_the_sigma_of_the_fit(fitted, strips_fit):
+    assert fitted.pinned == {}
+    assert list(strips_fit.pinned) == ["one", "two", TOGETHER]
+    for fit in (fitted, strips_fit):
+        together = fit.sensitivity[TOGETHER]
+        for name, modulus in fit.best.certainty.moduli.items():
+            expected = np.where(modulus.determined, modulus.sigma, np.inf)
+            np.testing.assert_allclose(together[name], expected)
+        for alone in fit.sensitivity.values():
+            assert all((alone[name] >= (1 - 1e-9) * together[name]).all() for name in together)
+
+
+def test_modulus_that_a_test_alone_determines_nowhere_is_noted():
+    open_, known = (SimpleNamespace(numbers={"not_determined": share}) for share in (1.0, 0.9))
+    pinned = {
+        "a": {"E1": known, "G12": open_},
+        "two": {"E1": open_, "G12": known},
+        TOGETHER: {"E1": known, "G12": open_},
+    }
+    assert [str(note) for note in notes_of_pinned(SimpleNamespace(pinned=pinned))] == [
+        "a alone does not determine G12 at any strain",
+        "two alone does not determine E1 at any strain",
+    ]
 
 
 @pytest.mark.parametrize("table", ["residuals", "moduli", "coefficients", "starts"])

@@ -23,7 +23,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
 from bubblefit.meshes.sampling import Facet, SmoothReading
-from bubblefit.readers.fields import read_fields
+from bubblefit.readers.fields import DisplacementField, read_fields
 from bubblefit.readers.frames import Frame, FrameOptions
 from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
 from bubblefit.runs.law_setup import law_of
@@ -251,6 +251,13 @@ def test_direction_of_an_elliptic_rim_gives_the_warp(reach, within):
     assert found.warp is not None and found.rim is not None and found.warp.clarity is None
     assert found.plane_of == ("edge" if reach == 1.0 else "clamp")
     assert found.rim.angle == pytest.approx(25.0, abs=0.02)
+    fields = [
+        DisplacementField(0.1 * k, f.points[:, :2], f.displacement, z=f.points[:, 2])
+        for k, f in enumerate(seen_frames, start=1)
+    ]
+    of_fields, registration = register_fields(fields, Outline(100.0, 70.0, 25.0))
+    np.testing.assert_array_equal(of_fields[-1].points, moved[-1].points[:, :2])
+    assert registration.warp_angle == found.warp_angle
     # Given: by the angle, or by two marks on the fabric.
     marks = tuple(tuple(p) for p in np.array([[0.0, 0, 0], [30, 0, 0]]) @ turn.T)
     for known in ({"warp": found.warp_angle}, {"warp_points": marks}):
