@@ -359,6 +359,16 @@ def test_card_replaces_a_file_only_if_told(tmp_path):
     assert 'unit = "MPa"' in path.read_text()
 
 
+def test_card_is_exported_to_files_of_the_name_of_the_format(tmp_path):
+    card = MaterialCard(quadratic_law(), 0.8, "plain")
+    (path,) = card.export("constants", tmp_path)
+    assert path.parent == tmp_path and path.stem == "material-constants"
+    with pytest.raises(OutputError, match="material-constants"):
+        card.export("constants", tmp_path)
+    assert card.export("constants", tmp_path, overwrite=True) == [path]
+    assert "expected one of marc, " in complaint(card.export, "nastran", tmp_path)
+
+
 def test_modulus_of_card_without_certainty_has_no_band():
     card = MaterialCard(HypoelasticLaw.linear(400.0, 250.0, 12.0), 0.8, "plain")
     modulus = card.modulus("E2", [0.0, 0.1])

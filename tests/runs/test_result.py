@@ -275,6 +275,18 @@ def test_curves_are_columns_of_residuals(fitted):
     assert curve["modelled"].tolist() == centre["modelled"].tolist()
 
 
+def test_curve_of_a_surface_is_that_of_the_point_nearest_to_the_centre(fitted):
+    table = pd.DataFrame({
+        "test": "b", "part": "b", "quantity": "dz", "frame": [1] * 4 + [2] * 2,
+        "x_mm": [3.0, -2.0, 0.0, 1.0, 5.0, -1.0], "y_mm": [0.0, 2.0, -5.0, 2.0, 0.0, -6.0],
+        "pressure_kPa": [10.0] * 4 + [20.0] * 2, "measured": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        "modelled": 0.0, "difference": 0.0, "unit": "mm",
+    })  # fmt: skip
+    curves = type(fitted).curves(SimpleNamespace(residuals=lambda: table))
+    assert curves["b dz"]["measured"].tolist() == [4.0, 5.0]
+    assert list(curves["b dz"]) == ["pressure_kPa", "measured", "modelled"]
+
+
 def test_printed_fit_says_moduli_and_verdict_in_three_lines(fitted):
     lines = str(fitted).splitlines()
     assert len(lines) == 3

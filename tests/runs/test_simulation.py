@@ -86,6 +86,11 @@ def test_failing_card_is_left_out_of_simulation(bars, tmp_path):
     bars.law_fails = lambda law: law.nu12 > 0.3
     done = simulate_cards(project_of(*tests), tests, {"soft": CARD, "stiff": STIFF}, tmp_path)
     assert done.numbers["cards"]["stiff"] == {"warp": "the bar breaks"}
+    assert [note["of"] for note in done.numbers["notes"]] == ["stiff"]
+    several = [BarTest("one", ("warp", "fill")), BarTest("two")]
+    cards = {"soft": CARD, "stiff": STIFF}
+    notes = simulate_cards(project_of(*several), several, cards, tmp_path / "several").notes
+    assert [note.of for note in notes] == ["one, stiff, warp", "one, stiff, fill", "two, stiff"]
     with pytest.raises(SolverFailure, match="the bar breaks"):
         simulate_cards(project_of(*tests), tests, {"stiff": STIFF}, tmp_path / "none")
     assert not (tmp_path / "none").exists()
