@@ -87,6 +87,7 @@ def test_report_of_an_unfinished_study_says_so(tmp_path):
     (table,) = page_of_folder(tmp_path).sections[0].parts
     assert table.title == "Fits within"
     assert table.rows == [["without one", "unfinished"], ["without two", "finished"]]
+    assert table.text == (1,)
 
 
 def test_folder_without_a_page_is_refused(tmp_path):

@@ -103,6 +103,13 @@ def strips_with_heads(folder, heads):
     return test
 
 
+def test_number_that_all_names_have_is_no_angle(tmp_path):
+    for name in ("nylon 15 1.csv", "nylon 15 2.csv"):
+        text = (DATA / "strips" / "warp_1.csv").read_text().replace("Kette", "20 °C")
+        (tmp_path / name).write_text(text)
+    assert proposed_tests(recognised_groups(tmp_path)) == []
+
+
 def test_direction_is_that_of_each_file_of_a_numbered_group(tmp_path):
     words = ("Kette", "Kette", "Schuss", "Schuss")
     heads = {f"Specimen_{k}.csv": f"Richtung;{word}" for k, word in enumerate(words, 1)}

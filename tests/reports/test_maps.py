@@ -1,6 +1,7 @@
 """Maps and surfaces over the sheet: packed values, shared colours, files for ParaView."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -89,6 +90,27 @@ def test_surface_shows_its_first_quantity_at_the_last_load():
     assert legend["title"] == "stress, N/mm"
     assert {s["name"]: s.get("value") for s in spec["signals"]}["ends"] == pytest.approx([1.0, 5.0])
     assert "5.0" in str(spec["data"]) and "9.0" not in str(spec["data"])
+
+
+@pytest.mark.parametrize(
+    ("size", "moved", "axes", "places"),
+    [
+        ((4, 2, 0), (0.5, 0.25, 0.0), ("x, mm", "y, mm"), [0.5, 0.25]),
+        ((4, 2, 1), (0.5, 0.25, 0.1), ("x, mm", "y, mm"), [0.5, 0.25]),
+        ((1, 2, 8), (0.5, 0.25, 0.1), ("z, mm", "y, mm"), [0.1, 0.25]),
+    ],
+)
+def test_deformed_mesh_is_seen_along_its_thinnest_side(size, moved, axes, places):
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 1]], float) * size
+    mesh = SimpleNamespace(points=points, quads=np.array([[0, 1, 2, 3]]))
+    history = SimpleNamespace(
+        load=np.ones(2), mesh=mesh, displacement=np.stack([0 * points, 0 * points + moved]),
+        stress=lambda: np.array([[[1.0, 2, 3]], [[4.0, 5, 6]]]),
+    )  # fmt: skip
+    (chart,) = maps.history_charts("n", history, "stress", 1, -1).charts
+    (body,) = chart.series
+    assert (chart.x_label, chart.y_label) == axes and body.values == [5.0]
+    assert [min(body.x), min(body.y)] == pytest.approx(places)
 
 
 def test_vtu_file_holds_the_deformed_mesh(tmp_path):

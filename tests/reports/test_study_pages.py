@@ -138,6 +138,20 @@ def test_errors_of_tests_left_out_are_drawn_beside_those_of_the_fit():
     assert list(chart.y_names) == ["one", "two"]
 
 
+def test_moduli_that_stay_unknown_are_rings_in_a_plan():
+    sigmas = [{"E1": 0.02, "G12": np.inf}, {"E1": 0.01, "G12": 2.0}, {"E1": 0.015, "G12": 0.3}]
+    present, *candidates = (SimpleNamespace(summary=s, moduli=s, title="a test") for s in sigmas)
+    study = SimpleNamespace(present=present, candidates=candidates)
+    (chart,) = study_pages.plan_charts(study, "c").charts
+    shown = named(chart)
+    assert list(chart.y_names) == ["the present tests alone", "1. a test", "2. a test"]
+    assert shown["E1"].x == pytest.approx([2.0, 1.0, 1.5])
+    assert shown["G12"].x == [None, None, pytest.approx(30.0)]
+    rings = shown["G12, not known"]
+    assert (rings.x, rings.y, rings.hollow) == ([100.0, 100.0], [1.0, 2.0], True)
+    assert "E1, not known" not in shown
+
+
 def test_percentiles_of_a_bootstrap_are_drawn_over_strain():
     strain, best = np.array([0.0, 0.02]), np.array([100.0, 110.0])
     names = ("E1", "E2", "G12")

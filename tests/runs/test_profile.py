@@ -63,11 +63,14 @@ def test_profile_that_meets_its_bounds_is_not_closed(project):
 def test_uneven_profile_is_put_in_words():
     below = ProfileSide((10.0, 9.0, 8.0), (0.0, 1.0, 4.0), "", 2)
     above = ProfileSide((10.0, 12.0, 14.0), (0.0, 1.0, 4.0), "", 2)
-    one = Profile(Target("G12", 0.02), 10.0, 1.0, (8.0, 12.0), below, above, (1.0, 99.0))
+    one = Profile(
+        Target("G12", 0.02, label="G12"), 10.0, 1.0, (8.0, 12.0), below, above, (1.0, 99.0)
+    )
     assert "(the fit's band 8 to 12)" in one.words
     root = np.sqrt(THRESHOLD)
     assert one.ends == pytest.approx((10 - root, 10 + 2 * root), rel=0.01)
     assert one.asymmetry == pytest.approx(2.0)
+    assert one.interval == "G12 at 2 % of strain is 8.04 to 13.92 MPa (95 %)"
     at_best = ProfileSide((10.0, 10.0), (0.0, 9.0), "", 2)
     for sides in ({"lower_side": at_best}, {"upper_side": at_best}):
         assert replace(one, **sides).asymmetry is None

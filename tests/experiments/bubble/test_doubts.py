@@ -67,6 +67,17 @@ def test_limits_of_column_doubts(check, name, count, sure, words, seen):
     assert_doubted(check, count, name, sure, *words, **seen)
 
 
+def test_strains_due_to_a_rise_are_those_along_the_axes_of_the_rim():
+    """2/3 (30 / 120)^2 along the long semi-axis of an ellipse, 2/3 (30 / 80)^2 along the short."""
+    seen = strain_of_rise(None, motion(0.02, 0.09), Outline(80.0, 120.0))
+    assert seen.expected == pytest.approx((0.041667, 0.09375), rel=1e-4)
+    strains = 0.02 + 0.02**2 / 2, 0.09 + 0.09**2 / 2
+    assert seen.ratios == pytest.approx((strains[0] / 0.041667, strains[1] / 0.09375), rel=1e-4)
+    less = strain_of_rise(motion(0.01, 0.03, rise=10.0), motion(0.02, 0.09), Outline(80.0, 120.0))
+    assert less.expected == pytest.approx((8 / 9 * 0.041667, 8 / 9 * 0.09375), rel=1e-4)
+    assert less.rise == (30.0, 10.0) and less.is_comparable
+
+
 def test_rise_from_a_loaded_frame_bounds_the_strain_from_below_only():
     check, seen = doubts.strain_unlike_rise, {"counts_from_pressure": True}
     assert doubts_said(check, centre_motions=(motion(0.5, 0.5),), **seen) == []

@@ -74,6 +74,21 @@ def test_edge_that_moves_is_doubted(motion, words):
 
 
 @pytest.mark.parametrize(
+    ("bump", "is_flat", "is_doubted"),
+    [(0.39, True, False), (0.41, True, True), (9.0, False, False)],
+)
+def test_sheet_that_is_taken_for_flat_and_is_not_is_doubted(bump, is_flat, is_doubted):
+    """Of a saddle in a tilted plane, from 0.004 of the radius on."""
+    points = points_on(CIRCLE)
+    x, y = points.T / 97.0
+    saddle = (x**2 - y**2) / np.abs(x**2 - y**2).max()
+    field = field_of(0.1, [0, 0, 30.0], points, z=600.0 + 5.0 * x - 3.0 * y + bump * saddle)
+    words = f"up to {bump:.2g} mm off a plane"
+    seen = {"fields": (field,), "is_flat": is_flat}
+    assert_doubted(doubts.first_shape, is_doubted, "flat-sheet", False, words, **seen)
+
+
+@pytest.mark.parametrize(
     ("dome", "rise", "words"),
     [
         (10.0, 10.0, ["stands 10 mm above its rim", "about 1.3 kPa by its height"]),

@@ -37,6 +37,14 @@ def test_sheet_that_falls_has_no_rim_and_is_doubted(clean_bubble):
     assert doubts_by_name(tuple(fields))["z-flipped"].sure
 
 
+def test_surfaces_are_those_above_half_of_the_last_rise():
+    fields = tuple(field_of(0.01 * rise, [0, 0, rise]) for rise in (10.0, 14.9, 15.1, 30.0))
+    view = MeasuredView(fields, CIRCLE, 0.8, False)
+    assert [rise[0] for _, rise in view.surfaces] == [15.1, 30.0]
+    sunk = MeasuredView((field_of(0.1, [0, 0, -30.0]),), CIRCLE, 0.8, False)
+    assert sunk.surfaces == []
+
+
 @pytest.mark.parametrize(
     ("radius", "sure"), [(85.0, True), (96.0, False), (100.0, None), (104.0, False), (110.0, True)]
 )

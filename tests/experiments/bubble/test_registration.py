@@ -251,6 +251,8 @@ def test_direction_of_an_elliptic_rim_gives_the_warp(reach, within):
     assert found.warp is not None and found.rim is not None and found.warp.clarity is None
     assert found.plane_of == ("edge" if reach == 1.0 else "clamp")
     assert found.rim.angle == pytest.approx(25.0, abs=0.02)
+    across, _ = register(seen_frames, (70.0, 100.0), RegistrationOptions(rim_angle=115.0))
+    np.testing.assert_allclose(across[-1].points * flip, frames[-1].points, atol=within)
     fields = [
         DisplacementField(0.1 * k, f.points[:, :2], f.displacement, z=f.points[:, 2])
         for k, f in enumerate(seen_frames, start=1)

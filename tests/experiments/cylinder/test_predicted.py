@@ -1,9 +1,11 @@
 """experiments/cylinder/predicted.py: numbers, curves and finer models of predicted bending."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.experiments.cylinder.measures import CurvePoint
 from bubblefit.experiments.cylinder.predicted import STUDIED, measured_table, quantities
 from bubblefit.project.project import read_project
 from bubblefit.readers.bending import BendingCurve
@@ -62,6 +64,27 @@ def test_curves_and_readings():
     assert curve.iloc[1].tolist()[:4] == pytest.approx([40.0, 100.0, 101.0, 4.9e7])
     assert curve["wrinkled_share"].isna().all()
     assert list(none.columns) == list(curve.columns) and len(none) == 0
+
+
+def test_band_of_measures_holds_both_ends_and_the_spread_of_loads_by_the_card():
+    """The spread grows from nothing to 4 N at 40 mm, and is 8 N from 80 mm on."""
+    x = case("x")
+    predicted, other = (
+        run(x, "soft"),
+        run(x, "soft", SimpleNamespace(name="slack", predicted=False)),
+    )
+    lower = replace(MEASURES, stiffness=4.0, knee=CurvePoint(70.0, 230.0), limit=None)
+    bent = {0: BENT, 1: BENT}
+    outcome = outcome_of(predicted, other, bent=bent, measures={0: MEASURES, 1: lower})
+    outcome.__dict__["spreads"] = {0: np.array([0.0, 4.0, 8.0])}
+    at_knee = 1.96 * 4.0 * 61.0 / 40.0
+    assert outcome.with_band(0, "knee") == pytest.approx((251.0, 230 - at_knee, 251 + at_knee))
+    slope = 1.96 * 2.0 / 20.0
+    assert outcome.with_band(0, "stiffness") == pytest.approx((4.256, 4.0 - slope, 4.256 + slope))
+    alone = outcome_of(predicted, bent={0: BENT})
+    alone.__dict__["spreads"] = {}
+    assert alone.with_band(0, "limit") == (502.6,) * 3
+    assert outcome.with_band(1, "limit") is None
 
 
 # Models and quantities of a study
