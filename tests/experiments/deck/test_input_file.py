@@ -1,5 +1,7 @@
 """experiments/deck/input_file.py: blocks of a deck, its constants, and a template of it."""
 
+from dataclasses import replace
+
 import pytest
 from bubblefit.experiments.deck.input_file import InputDeck
 
@@ -62,7 +64,9 @@ def test_constants_of_materials_have_names_bounds_and_places(tmp_path):
     }
     assert constants["mu1"].bounds == (0.3, 7.5)
     assert constants["mu2"].bounds == (-2.0, -0.08)
-    assert constants["nu"].bounds == (0.0, 0.49)
+    for value in (0.0, 0.3, 0.49):
+        assert replace(constants["nu"], value=value).bounds == (0.0, 0.49)
+    assert replace(constants["nu"], value=-0.1).bounds == (-0.5, -0.02)
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,8 @@ def test_curve_is_read_where_it_was_measured(tmp_path):
     assert history.load_rounding == pytest.approx(np.full(2, 1e-2))
     write(tmp_path, [(0, 0), (-0.5, 1.5), (-1, 3), (-2, 6)])
     assert read(tmp_path, [-0.75]).load.tolist() == [4.5]
+    write(tmp_path, [(4, 0), (3, 1.5), (2, 3), (1, 4.5)])
+    assert read(tmp_path, [2.5]).load.tolist() == [4.5]
 
 
 def test_increments_of_a_program_do_not_show_in_a_curve(tmp_path):
