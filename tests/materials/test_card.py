@@ -369,6 +369,15 @@ def test_card_is_exported_to_files_of_the_name_of_the_format(tmp_path):
     assert "expected one of marc, " in complaint(card.export, "nastran", tmp_path)
 
 
+def test_band_is_two_sigma_of_the_coefficients_and_not_below_zero():
+    law = HypoelasticLaw.linear(400.0, 250.0, 12.0)
+    certainty = CardCertainty(np.array([[8.0, 0.0, 30.0], [0.0, 0.0, 40.0]]))
+    for name, value, sigma in (("E1", 400.0, 50.0), ("E2", 250.0, 0.0), ("G12", 12.0, 8.0)):
+        lower, upper = certainty.band(law, name, [0.0, 0.1])
+        assert upper == pytest.approx([value + card_module.BAND * sigma] * 2)
+        assert lower == pytest.approx([max(value - card_module.BAND * sigma, 0.0)] * 2)
+
+
 def test_modulus_of_card_without_certainty_has_no_band():
     card = MaterialCard(HypoelasticLaw.linear(400.0, 250.0, 12.0), 0.8, "plain")
     modulus = card.modulus("E2", [0.0, 0.1])
