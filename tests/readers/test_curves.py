@@ -102,6 +102,7 @@ def test_r_squared_and_rmse_of_a_load_polynomial():
 @pytest.mark.parametrize(
     ("u", "load", "order", "words"),
     [
+        ([1, 1 + 4e-14, 1 - 4e-14, 1, 2], [1, 2, 3, 4, 5], 3, "settle only 2 of 3"),
         ([1, 2], [1, 2, 3], 1, "got 2 and 3"), ([1, np.nan], [1, 2], 1, "finite numbers"),
         ([], [], 1, "elongation above 0"), ([-1, -2], [1, 2], 1, "elongation above 0"),
         ([0, 0], [1, 2], 1, "elongation above 0"), ([1, 2], [3, 3], 1, "all 2 loads are 3 N"),

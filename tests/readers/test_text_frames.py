@@ -6,7 +6,12 @@ from pathlib import Path
 import pytest
 from bubblefit.readers import text_frames
 from bubblefit.readers.frames import FrameOptions, read_frames
-from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
+from bubblefit.readers.text_frames import (
+    find_layout,
+    is_summary,
+    quantity_columns,
+    read_numbers,
+)
 
 from ..support.refusals import complaint
 
@@ -73,6 +78,21 @@ def test_missing_row_of_names_is_refused(tmp_path):
     named = dict(zip(WANTED, "12345", strict=True))
     text = "1 2 3 4 5\n7 8 9 10 11\n"
     assert "no row of names" in complaint(layout_of, tmp_path, text, **named)
+
+
+@pytest.mark.parametrize(
+    ("row", "first", "expected"),
+    [
+        ("remark,1,nan", "1,2,3", True),
+        ("remark,1,2", "1,2,3", True),
+        ("nan,1,remark", "1,2,3", False),
+        ("remark,1,2", "point,2,3", False),
+        ("mean,1,2", "point,2,3", True),
+        ("1,2,3", "1,2,3", False),
+    ],
+)
+def test_rows_that_begin_with_a_word_are_a_summary_below_numbers(row, first, expected):
+    assert is_summary(row, first, ",") is expected
 
 
 def test_ambiguous_columns_of_a_frame_are_refused(tmp_path):

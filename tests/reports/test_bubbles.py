@@ -98,6 +98,10 @@ def test_frames_that_are_taken_are_marked_at_their_pressures():
     assert frames.colour != taken.colour and taken.hollow and not frames.hollow
 
 
+def test_pressures_have_colours_from_a_tenth_of_the_scale_on():
+    assert bubbles.ranks(4) == pytest.approx([0.1, 0.4, 0.7, 1.0])
+
+
 def still(points):
     return np.column_stack([0 * points, points[:, 0]])
 

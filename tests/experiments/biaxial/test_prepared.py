@@ -48,6 +48,23 @@ def test_errors_at_a_fitted_share_of_the_load_are_those_of_the_residuals(tmp_pat
     np.testing.assert_allclose(errors[1] - errors[0], -0.1 * column, rtol=1e-9)
 
 
+def test_strains_change_with_the_share_of_the_load_by_the_slope_of_their_curve(tmp_path):
+    """Strains of n / 20 + (n / 20)^4 %, of loads n in kN/m."""
+    loads = np.linspace(1.0, 30.0, 30)
+    strain = loads / 20.0 + (loads / 20.0) ** 4
+    rows = [("1:1", n, n, e, e) for n, e in zip(loads, strain, strict=True)]
+    write_biaxial_rows(tmp_path / "test.csv", rows)
+    test = "load_share = 0.9\nload_share_deviation = 0.05"
+    setup = fit_setup(biaxial_project(tmp_path, test, "constant"))
+    (comparison,) = setup.tests[0].comparisons(setup.make_solver, Weighting())
+    objective = comparison.objective
+    name, start = objective.load_share
+    column = objective.nuisance_columns([name], {name: start}, None)[:, 0] * objective.scale
+    slope = loads / 20.0 + 4.0 * (loads / 20.0) ** 4
+    expected = (slope - slope[0])[1:] / 0.9
+    np.testing.assert_allclose(column, np.tile(expected, 2), rtol=1e-9)
+
+
 def test_biaxial_residuals_and_derivatives(five_ratios_folder):
     setup = fit_setup(five_ratios_folder / "project.toml")
     (prepared,) = setup.tests

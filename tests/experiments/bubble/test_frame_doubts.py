@@ -1,5 +1,7 @@
 """experiments/bubble/frame_doubts.py: order, repetition and reference of frames."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import doubts, frame_doubts
@@ -105,6 +107,32 @@ def test_dome_of_the_reference_picture_gives_its_pressure(dome, rise, words):
     seen = {"fields": (field_of(0.010003, [0, 0, rise], points, z=600.0 + z),)}
     count = bool(words)
     assert_doubted(doubts.loaded_reference, count, "loaded-reference", False, *words, **seen)
+
+
+@pytest.mark.parametrize(
+    ("slack", "loaded", "estimate"),
+    [(-0.15, 2.0, 2.0), (-0.15, 0.1, 0.2), (-0.2, 15.0, 10.0), (-0.14, 2.0, None)],
+)
+def test_pressure_of_a_loaded_reference_follows_from_the_rises(slack, loaded, estimate):
+    """Heights grow with the cube root; from a hundredth to half of the lowest pressure, kPa."""
+    pressures = np.array([0.02, 0.1, 0.2])
+    sheet = SimpleNamespace(reference_frame=None, moving_rim=False)
+    test = SimpleNamespace(
+        sheet=sheet, displacement_offset=False, match_by="points", rising=3, pressures=pressures,
+        outline=CIRCLE,
+    )  # fmt: skip
+    rises = 60.0 * (np.cbrt(pressures) - np.cbrt(1e-3 * loaded))
+    prepared = SimpleNamespace(
+        test=test,
+        known=None,
+        sheet=SimpleNamespace(surface=None),
+        view=SimpleNamespace(rises=rises),
+    )
+    found = frame_doubts.loaded_alternative(prepared, {"slack_warp": slack, "slack_fill": 0.1})
+    if estimate is None:
+        assert found is None
+    else:
+        assert (found.estimate, found.largest) == pytest.approx((estimate, 18.0))
 
 
 UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])

@@ -1,6 +1,7 @@
 """experiments/bubble/measured_view.py: rises and clamp of measured fields."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -82,6 +83,15 @@ def test_outlier_is_ten_deviations_and_a_fiftieth_of_the_rise_off(scatter, dista
     assert found.count == is_outlying
     assert found.scatter == pytest.approx(1.4826 * scatter, rel=0.03)
     assert found.farthest == pytest.approx(distance * is_outlying, rel=0.02)
+
+
+@pytest.mark.parametrize(("share", "is_named"), [(0.09, True), (0.11, False)])
+def test_outlying_points_are_named_up_to_a_tenth_of_all(share, is_named):
+    field = field_of(0.1, [0, 0, 30.0], points_on(CIRCLE))
+    is_outlying = np.arange(len(field.points)) < share * len(field.points)
+    view = MeasuredView((field,), CIRCLE, 0.8, False)
+    view._outliers_by_field[field] = SimpleNamespace(is_outlying=is_outlying)
+    assert (view.outlying_points(field) == (is_outlying & is_named)).all()
 
 
 @pytest.mark.parametrize("y", [-2.0, 2.0])

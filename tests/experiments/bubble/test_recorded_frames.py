@@ -4,6 +4,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
@@ -326,6 +327,15 @@ def test_hole_of_an_hour_in_a_log_of_a_fifth_of_a_second_is_doubted(hole, is_dou
     # A hole before the first frame tells nothing of the frames.
     early = np.where(CLOCK > 2, CLOCK, CLOCK - 3600.0)
     assert doubts(HEIGHTS, early, pressure(CLOCK)) == []
+
+
+@pytest.mark.parametrize(("key", "value"), [("from_name", True), ("column", "p")])
+def test_pressures_of_arrays_are_in_no_files(key, value):
+    points = np.zeros((30, 3))
+    data = {"points": {"pressure": {key: value}}}
+    bubble = bf.Bubble(points, [points, points], [0.05, 0.1], radius=100.0, data=data)
+    said = complaint(bf.Project.of, bubble, bf.Law("constant"), fabric=bf.Fabric("made", 0.8))
+    assert said.startswith(f"bubble: pressure.{key}: is of files, and arrays are given")
 
 
 def test_second_inflation_of_pressures_that_only_rise_is_refused(frames_folder):

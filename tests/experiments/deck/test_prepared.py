@@ -56,6 +56,14 @@ def test_constants_are_found_in_the_forces_of_their_own_deck(cube):
     assert again.program_runs[0] == again.program_runs[1] > runs == 0  # all from the cache
 
 
+@pytest.mark.parametrize("thickness", [None, 0.7, 1.3])
+def test_deck_has_the_thickness_of_a_card(tmp_path, monkeypatch, thickness):
+    (test,) = read_project(bar_project(tmp_path, monkeypatch)).tests.values()
+    of_fabric = test.place.fabric.thickness
+    (model,) = test.models(thickness).values()
+    assert model.thickness == pytest.approx(of_fabric if thickness is None else thickness)
+
+
 @pytest.mark.parametrize(("method", "runs"), [("lm", 12), ("slsqp", 60), ("cobyla", 60)])
 def test_methods_find_them_within_their_condition(tmp_path, monkeypatch, method, runs):
     setup = fit_setup(bar(tmp_path, monkeypatch).with_fit(method=method, max_analyses=60))
