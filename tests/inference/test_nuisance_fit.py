@@ -41,6 +41,14 @@ def test_evaluated_law_keeps_its_coefficients_and_fits_nuisance_alone():
     assert fit_nuisance(fit, y)[0] is None
 
 
+def test_nuisance_of_a_given_law_makes_the_sum_of_norms_least():
+    """Least squares, which come first, split what the thickness alone makes up for, 0.8 / 1.3."""
+    fit = bubble_and_strip(THICKNESS)
+    best, status = fit_nuisance(fit, fit.unknowns.at(LAW.beta * 1.3))
+    assert status == "converged"
+    assert best.unknowns[12:] == pytest.approx([0.8 / 1.3, 0.0, 0.0], abs=1e-5)
+
+
 ENDS = np.array([0.1, 0.1, 0.05])
 
 

@@ -280,12 +280,13 @@ def test_comparison_with_measured_curves():
     way = np.linspace(0.0, 120.0, 1201)
     load = np.where(way < 10, 40 * way, 400 + 4 * (way - 10))
     read = 0.75 * load + 30.0 * (way > 0.0)
-    reading = curve_reading(340.0, [100.0, 500.0], 4.0)
+    reading = curve_reading(340.0, [100.0, 110.5, 500.0], 4.0)
     found = against_measured(reading, way, load, [BendingCurve("a", way[:1101], read[:1101])])
     assert found.reference == 100.0
     assert found.pairs["secant stiffness"] == pytest.approx((40.0, 30.0), rel=1e-6)
     assert found.pairs["secant knee"] == pytest.approx((396.0, 0.75 * 396.0 + 30.0), rel=0.02)
     assert found.pairs["load at 100 mm"] == pytest.approx((760.0, 600.0))
+    assert found.pairs["load at 110.5 mm"] is None
     assert found.pairs["load at 500 mm"] is None and found.ratios["load at 500 mm"] is None
     assert found.ratios["secant stiffness"] == pytest.approx(40.0 / 30.0)
     twice = [BendingCurve(name, way, factor * read) for name, factor in (("a", 0.9), ("b", 1.1))]
