@@ -56,7 +56,9 @@ def test_validation_predicts_what_is_left_out_with_the_parameters_of_the_others(
     (tmp_path / "stiffer.csv").write_text("travel [mm],force [N]\n2,0.8\n4,1.4\n")
     second = deck.replace('"bar"', '"stiffer bar"').replace("frame.csv", "stiffer.csv")
     path.write_text(text + second)
-    in_process("validate", path, "--out", tmp_path / "out", "--jobs", 1, cwd=tmp_path)
+    in_process(
+        "validate", path, "--out", tmp_path / "out", "--starts", 2, "--jobs", 1, cwd=tmp_path
+    )
     rows = (tmp_path / "out" / "validation.csv").read_text().splitlines()
     predicted = {row.split(",")[1]: float(row.split(",")[4]) for row in rows[1:]}
     assert predicted["stiffer bar"] > 0.2  # N: its own parameters would fit both readings

@@ -193,6 +193,7 @@ def test_doctor_reports_a_named_marc(fake_marc, complete_run, tmp_path, monkeypa
     folder, _ = complete_run
     fake_marc(f"cp {folder}/job.* .")
     monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path))  # without a ccx, which takes seconds
     assert [one.name for one in diagnose()][-1] != "marc"
     # It is there, but does not answer the bars.
     site = tmp_path / "site.toml"
