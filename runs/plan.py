@@ -444,13 +444,12 @@ def _additions(
 ) -> list[Addition]:
     """Return the candidates that can be computed; add notes on all others to `notes`."""
     additions = []
+    shared = shared_unknowns(optimum.setup.project)
     for number, (kind, candidate) in enumerate(offers):
         on_event(number, len(offers), candidate.name)
         count = candidate.specimens if specimens is None else specimens
         try:
-            information, noise, candidate_notes = _information(
-                candidate, optimum, shared_unknowns(optimum.setup.project)
-            )
+            information, noise, candidate_notes = _information(candidate, optimum, shared)
         except (SolverFailure, InputError) as error:
             words = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
             notes.append(Note(FAILED, words, candidate.name))

@@ -1,6 +1,7 @@
 """Results of a fitted bubble test in numbers and words: its sheet, frames and registration."""
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -65,10 +66,13 @@ def objective_of(fitted: FittedTest) -> FieldObjective:
     return comparison.objective
 
 
-def fitted_model(fitted: FittedTest) -> BubbleModel:
-    """Return the model of the test's one comparison, with the parameters that the fit found."""
+def fitted_model(fitted: FittedTest, nuisance: Mapping[str, float] | None = None) -> BubbleModel:
+    """Return the model of the test's one comparison, with the parameters that the fit found.
+
+    `nuisance` are other values of the nuisance unknowns than those of the histories.
+    """
     (comparison,) = fitted.comparisons
-    return cast(BubbleModel, comparison.model_at(fitted.nuisance))
+    return cast(BubbleModel, comparison.model_at(nuisance or fitted.nuisance))
 
 
 def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any]:
@@ -79,7 +83,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     sheet = prepared.test.sheet
     heights = fitted_model(fitted).mesh.points[:, 2]
     nuisance = fitted.reported_nuisance
-    model = cast(BubbleModel, fitted.comparisons[0].model_at(nuisance))
+    model = fitted_model(fitted, nuisance)
     surface = prepared.sheet.surface
     reference_pressure = None
     if sheet.reference_frame is not None:

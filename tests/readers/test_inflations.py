@@ -47,7 +47,7 @@ def test_line_counts_inflations_with_or_without_their_last_release(branches):
 
 
 def test_height_of_later_inflations_is_told_at_a_few_pressures():
-    """Of seven pressures, every other; the apex rises to twice and thrice the first height."""
+    """Take every other of seven pressures; the apex rises to twice and thrice the first height."""
     rising = np.linspace(0.01, 0.07, 7)
     pressure = np.concatenate([[*rising, *rising[-2::-1], 0.0]] * 3)
     height = np.repeat([1.0, 2.0, 3.0], 14) * 100.0 * pressure

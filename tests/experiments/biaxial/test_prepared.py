@@ -167,7 +167,7 @@ def test_bands_hold_the_noise_of_the_rows_from_which_strains_count(tmp_path):
 
 
 def test_rows_of_a_table_are_used_thinned_or_of_no_loading(tmp_path):
-    """Of each of two ratios 30 rows load and 15 unload."""
+    """Load 30 rows of each of two ratios, and unload 15."""
     write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1", "2:1"]))
     (test,) = bf.read_project(biaxial_project(tmp_path, "points = 10")).tests.values()
     (file,) = PreparedBiaxial(test).data_files()
@@ -242,7 +242,7 @@ STIFF_WARP = Expected({"E1": (500.0, 3000.0), "E2": (200.0, 1500.0), "G12": (1.0
     ],
 )
 def test_warp_that_is_softer_than_the_fill_is_doubted_by_the_bounds(tmp_path, ratios, words):
-    """By equal loads; strains are small, so that their quotient is that of the moduli."""
+    """Compare equal loads; strains are small, so that their quotient is that of the moduli."""
     law = HypoelasticLaw.linear(600.0, 900.0, 30.0, 0.0)
     rows = biaxial_rows(law, ratios, lowest=0.1, highest=0.9)
     found = listed_doubts(tmp_path, rows, STIFF_WARP)

@@ -66,7 +66,7 @@ def test_frame_at_rest_under_pressure_is_doubted_and_the_reverse(pressure, rise,
     ],
 )
 def test_edge_that_moves_is_doubted(motion, words):
-    """By more than 0.03 of the rise along the sheet, or 0.15 of it up."""
+    """Doubt motions above 0.03 of the rise along the sheet, or 0.15 of it up."""
     points = points_on(CIRCLE)
     moved = motion + np.outer(1.0 - (points**2).sum(axis=1) / 1e4, [0.0, 0.0, 30.0])
     fields = field_of(0.02, 0.1 * moved, points), field_of(0.05, moved, points)
@@ -80,7 +80,7 @@ def test_edge_that_moves_is_doubted(motion, words):
     [(0.39, True, False), (0.41, True, True), (9.0, False, False)],
 )
 def test_sheet_that_is_taken_for_flat_and_is_not_is_doubted(bump, is_flat, is_doubted):
-    """Of a saddle in a tilted plane, from 0.004 of the radius on."""
+    """Doubt a saddle in a tilted plane from 0.004 of the radius on."""
     points = points_on(CIRCLE)
     x, y = points.T / 97.0
     saddle = (x**2 - y**2) / np.abs(x**2 - y**2).max()
