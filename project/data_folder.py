@@ -38,7 +38,7 @@ from ..readers.machine_tables import (
 from ..readers.quantities import DIRECTION_ALIASES, FILL, WARP, columns_of
 from ..readers.tables import NUMBER, UTF_16_MARKS, decimal_mark, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS, split_unit
-from ..readers.values_in_files import number_in_name, values_in_file
+from ..readers.values_in_files import doubtful_name, number_in_name, values_in_file
 from .sections import Settings
 
 #: What files may hold.
@@ -465,7 +465,8 @@ def _gauge_bubbles(groups: Sequence[FileGroup]) -> list[Settings]:
         test.setdefault("files", {}).setdefault(table.section, []).extend(group.names)
         if not table.has_pressure:
             pressures = [pressure_of(file) for file in group.files]
-            is_told = None not in pressures
+            is_split = doubtful_name(group.files, PRESSURE_UNITS) is not None
+            is_told = None not in pressures and not is_split
             test |= {"pressures": pressures} if is_told else {"sizes": ["radius", "pressures"]}
             test["count_of_files"] = len(group.files)
         test["is_central"] = table.is_central and test.get("is_central", True)

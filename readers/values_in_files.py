@@ -212,6 +212,58 @@ _UNSIGNED = r"\d+(?:[.,]\d+)?"
 MAX_LISTED_NUMBERS = 5
 
 
+def numbers_in_names(
+    files: Sequence[Path],
+    units: Mapping[str, float],
+    pattern: str | None = None,
+    unit: str | None = None,
+    field: str = "",
+) -> Array:
+    """Return the values (files,) of a quantity that the names of a sequence of files hold.
+
+    As `number_in_name`. Without a pattern, "1_5bar" is refused too, unless the sequence shows that
+    the first of two whole numbers is a counter and no part of the value.
+    """
+    values = np.array([number_in_name(file, units, pattern, unit, field) for file in files])
+    if pattern is None and (doubtful := doubtful_name(files, units)):
+        file, (counter, mark, number, name) = doubtful
+        problem = (
+            f"{number} {name} may be {counter}.{number} {name}, and the names of the files do not "
+            f"show which; write 1.5 with a point, or a pattern with one group says what is meant: "
+            rf"'(\d+{mark}\d+){name}' or '{mark}(\d+){name}', with its unit"
+        )
+        raise InputError(file, field, problem)
+    return values
+
+
+def doubtful_name(
+    files: Sequence[Path], units: Iterable[str]
+) -> tuple[Path, tuple[str, ...]] | None:
+    """Return a name with a number that may be the decimals of the one before it, and its parts."""
+    split = re.compile(rf"(?<![\d.,])(\d+)([_ -]){_number_with(units)}")
+    matches = [(file, match) for file in files if (match := split.search(file.stem))]
+    # One with a decimal mark, or a counter with zeros in front, says how all are meant.
+    if not matches or any(re.match(r"0\d|.*[.,]", match[0]) for _, match in matches):
+        return None
+    counters = np.array([int(match[1]) for _, match in matches])
+    numbers = np.array([int(match[3]) for _, match in matches])
+    if len(matches) == len(files) and _is_counted(counters, numbers):
+        return None
+    return matches[0][0], matches[0][1].groups()
+
+
+def _is_counted(counters: Array, numbers: Array) -> bool:
+    """Return whether whole numbers before others (files,) name the test or count its files."""
+    rises = np.diff(numbers)
+    # Single digits are the usual decimals.
+    if numbers.max() < 10 or not rises.any():
+        return False
+    if (counters == counters[0]).all():
+        return bool(counters[0] > 0 and (rises > 0).all())
+    min_files = 5 if (rises >= 0).all() else 10
+    return bool((np.diff(counters) == 1).all() and len(numbers) >= min_files)
+
+
 def number_in_name(
     path: Path,
     units: Mapping[str, float],
@@ -244,7 +296,7 @@ def number_in_name(
         There is no such number, or several.
     """
     if pattern is not None:
-        return _number_by_pattern(path, pattern, field) * (1.0 if unit is None else units[unit])
+        return _number_by_pattern(path, pattern, units, unit, field)
     matches = re.findall(_number_with(units), path.stem)
     if len(matches) != 1:
         listed = " and ".join(f"{number} {name}" for number, name in matches) or "none"
@@ -262,18 +314,26 @@ def number_in_name(
 
 def _number_with(units: Iterable[str]) -> str:
     """Return the pattern of a number and its unit."""
+    return rf"({_UNSIGNED})[ _]?{_unit_of(units)}"
+
+
+def _unit_of(units: Iterable[str]) -> str:
+    """Return the pattern of a unit's name."""
     names = "|".join(sorted(units, key=len, reverse=True))
     # A letter after the unit makes it a word: "12max" is not 12 m.
-    return rf"({_UNSIGNED})[ _]?({names})(?![^\W\d_])"
+    return rf"({names})(?![^\W\d_])"
 
 
-def _number_by_pattern(path: Path, pattern: str, field: str) -> float:
-    """Return the number that the group of a pattern finds in a file's name.
+def _number_by_pattern(
+    path: Path, pattern: str, units: Mapping[str, float], unit: str | None, field: str
+) -> float:
+    """Return the value in the base unit that the group of a pattern finds in a file's name.
 
     Raises
     ------
     InputError
-        The pattern takes too long or does not fit, or its group holds no number.
+        The pattern takes too long or does not fit, its group holds no number, or another unit
+        stands right behind it.
     """
     has_several_repeats = len(_REPEATS.findall(pattern)) > 1
     if has_several_repeats and not ends_within(SEARCH_SECONDS, partial(_search, pattern, path)):
@@ -282,11 +342,20 @@ def _number_by_pattern(path: Path, pattern: str, field: str) -> float:
     match = _search(pattern, path)
     if match is None:
         raise InputError(path, field, f"the file's name does not fit the pattern {pattern!r}")
+    # A group of two whole numbers is one with decimals.
+    text = re.sub(r"(?<=\d)[_ p-](?=\d+$)", ".", match[1] or "")
     try:
-        return parse_number(match[1] or "")
+        number = parse_number(text)
     except ValueError:
         problem = f"expected a number in the group of {pattern!r}, found {match[1]!r}"
         raise InputError(path, field, problem) from None
+    size = 1.0 if unit is None else units[unit]
+    behind = re.match(_unit_of(units), path.name[match.end(1) :])
+    if behind and units[behind[1]] != size:
+        base_unit = next(name for name in units if units[name] == size)
+        problem = f"{behind[1]} stands behind the number, which {pattern!r} reads in {base_unit}"
+        raise InputError(path, field, problem)
+    return number * size
 
 
 def _search(pattern: str, path: Path) -> re.Match[str] | None:

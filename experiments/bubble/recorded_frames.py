@@ -27,7 +27,7 @@ from ...readers.machine_tables import Channel, read_times
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
 from ...readers.values_in_files import (
     check_pattern,
-    number_in_name,
+    numbers_in_names,
     picture_numbers,
     values_in_file,
 )
@@ -273,11 +273,9 @@ def _recorded_pressures(section: PressureSection, files: FrameFiles) -> Recordin
         return _pressures_in_files(section, section.column, files)
     pattern = section.from_name if isinstance(section.from_name, str) else None
     unit = section.unit or files.place.scales.pressure_unit
-    pressures = [
-        number_in_name(file, PRESSURE_UNITS, pattern, unit, "from_name") for file in files.files
-    ]
+    pressures = numbers_in_names(files.files, PRESSURE_UNITS, pattern, unit, "from_name")
     names = [file.name for file in files.files]
-    return Recording(np.array(pressures), names, "the files' names")
+    return Recording(pressures, names, "the files' names")
 
 
 def _listed_pressures(pressures: Sequence[float], files: FrameFiles) -> Recording:
@@ -422,8 +420,8 @@ def _times_in_names(section: LogSection, files: Sequence[Path], count: int) -> A
     if section.rate is not None and pattern is None:
         problem = "with 'rate', expected a pattern whose group is the number of the picture"
         raise InputError(None, "time_in_name", problem)
-    numbers = [number_in_name(file, TIME_UNITS, pattern, None, "time_in_name") for file in files]
-    return np.array(numbers) / (section.rate or 1.0)
+    numbers = numbers_in_names(files, TIME_UNITS, pattern, None, "time_in_name")
+    return numbers / (section.rate or 1.0)
 
 
 def _find_beside(

@@ -9,6 +9,7 @@ from bubblefit.readers.units import PRESSURE_UNITS, TIME_UNITS
 from bubblefit.readers.values_in_files import (
     check_pattern,
     number_in_name,
+    numbers_in_names,
     picture_numbers,
     values_in_file,
 )
@@ -100,6 +101,42 @@ def test_ambiguous_number_in_a_name_is_refused():
     for name in ("12p5kPa.csv", "1E2 kPa.csv"):
         words = "kPa stands behind a letter that may be a decimal mark or a power; a pattern"
         complaint_with([name, words], number_in_name, Path(name), PRESSURE_UNITS)
+
+
+@pytest.mark.parametrize(
+    ("names", "numbers"),
+    [
+        ("p_0_5bar p_1_0bar p_1_5bar", None), ("p_0_5bar p_1bar p_1_5bar", None),
+        ("1-5bar 2-0bar", None), ("p_1_50_bar", None), ("p_0_10bar p_0_20bar", None),
+        # As counters or as decimals, each could be meant.
+        ("s1_12kPa s2_24kPa s3_36kPa", None), ("p1_2bar p2_4bar p3_6bar p4_8bar p5_9bar", None),
+        ("1_12bar 2_15bar 3_11bar 4_18bar 5_20bar", None),
+        ("s1_12kPa s2_35.5kPa s3_60kPa", [12, 35.5, 60]), ("01_5kPa 02_7kPa", [5, 7]),
+        ("s09_5kPa s10_7kPa", [5, 7]),
+        ("bubble_2_5kPa bubble_2_10kPa", [5, 10]),
+        ("p1_0kPa p2_0kPa p3_5kPa p4_10kPa p5_10kPa", [0, 0, 5, 10, 10]),
+        ("1_2kPa 2_4kPa 3_8kPa 4_4kPa 5_2kPa 6_0kPa 7_9kPa 8_19kPa 9_9kPa 10_1kPa",
+         [2, 4, 8, 4, 2, 0, 9, 19, 9, 1]),
+        ("1,5bar 2,0bar", [150, 200]), ("150mbar 1200mbar", [15, 120]),
+    ],
+)  # fmt: skip
+def test_whole_number_that_may_be_decimals_of_another_is_refused(names, numbers):
+    files = [Path(f"{name}.csv") for name in names.split()]
+    if numbers is not None:
+        values = 1e3 * numbers_in_names(files, PRESSURE_UNITS)
+        assert values == pytest.approx(np.array(numbers))
+        return
+    message = complaint(numbers_in_names, files, PRESSURE_UNITS, None, None, "from_name")
+    assert message.startswith(f"{files[0].name}: from_name: "), message
+    assert "one group says what is meant: '(" in message
+
+
+def test_pattern_reads_two_whole_numbers_as_one_with_decimals():
+    files = [Path(f"p_{name}bar.csv") for name in ("0_5", "1_50", "12p5", "3-25")]
+    values = numbers_in_names(files, PRESSURE_UNITS, r"_(\d+[_p-]\d+)bar", "bar")
+    assert values == pytest.approx([0.05, 0.15, 1.25, 0.325])
+    words = "bar stands behind the number, which '_(.+)bar' reads in kPa"
+    complaint_with([words], numbers_in_names, files, PRESSURE_UNITS, "_(.+)bar", "kPa")
 
 
 @pytest.mark.parametrize(
