@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..experiments.base import PreparedTest
 from ..experiments.data_files import Output
 from ..experiments.forward import CardRun
@@ -103,10 +104,13 @@ def write_study(study: Any, folder: Path) -> Path:
 
 
 def figure(study: Any) -> Charts:
-    """Return the first figure of a study, for a notebook."""
-    page, _, figures, _ = CONTENT[type(study)](study)
+    """Return the first figure of a study, for a notebook; raise InputError if it has none."""
+    page, _, figures, _ = CONTENT.get(type(study), _table_alone)(study)
     on_page = (part for section in page.sections for part in section.parts)
     charts = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
+    if not charts:
+        problem = f"a study of type {type(study).__name__} has no charts; table() has its numbers"
+        raise InputError(None, "plot", problem)
     return charts[0]
 
 

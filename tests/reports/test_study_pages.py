@@ -18,6 +18,7 @@ from bubblefit.runs.profile import Target
 from bubblefit.runs.refinement import ratios
 
 from ..support.charts import check_charts, named
+from ..support.refusals import complaint
 
 
 def law(name, coefficients, fitted, validated=np.nan, folds=()):
@@ -193,3 +194,8 @@ def test_page_of_study_without_its_own_shows_its_table(tmp_path):
     assert (
         json.loads((tmp_path / "out" / "result.json").read_text())["command"] == "study thickness"
     )
+
+
+def test_plot_of_study_without_charts_is_refused():
+    words = "plot: a study of type Thicknesses has no charts; table() has its numbers"
+    assert complaint(Thicknesses().plot) == words
