@@ -227,7 +227,7 @@ def certainty(
         *(Note(UNCERTAIN, words) for words in uncertain if words),
         *open_notes,
         *notes_of_bounds(problem, best, open_modulus),
-        *notes_of_discrepancies(discrepancy),
+        *notes_of_discrepancies(discrepancy, has_law=problem.unknowns.size > 0),
     ]
     return Certainty(
         noise,

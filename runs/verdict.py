@@ -55,6 +55,12 @@ WITHIN = f"±{percent(USABLE)}"
 NOTHING_USABLE = Objection(f"no modulus is known to {WITHIN} at any strain", "", unusable=True)
 COMPARE_CURVES = "see in the charts where model and measured values part: card or data are doubtful"
 FURTHER_MEASUREMENT = "compare the filled deck with a measurement that was not fitted"
+#: Advice in place of that which names a study of the law, for fits that have none.
+ADVICE_WITHOUT_LAW = dict.fromkeys(
+    (MISFIT_ADVICE, WRONG_FORM.advice),
+    "look for wrong data (bubblefit check), then for what the deck keeps fixed: loads, supports "
+    "and further parameters",
+)
 NO_BANDS = "the moduli have no bands"
 BEYOND = "any modulus beyond the strains that the tests reach"
 
@@ -168,6 +174,7 @@ def verdict_of_parameters(
     unknown = [v.name for v in verdicts if v.name not in usable]
     reasons = [objection.reason for objection in objections]
     step = next((objection.advice for objection in objections), FURTHER_MEASUREMENT)
+    step = ADVICE_WITHOUT_LAW.get(step, step)
     sentence = f"known to {WITHIN}: {', '.join(usable) or 'no parameter'}"
     state = _state(bool(usable) and not _are_unusable(objections), bool(reasons or unknown))
     return FitVerdict(state, sentence, tuple(reasons), ", ".join(unknown), step)

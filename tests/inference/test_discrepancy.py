@@ -100,6 +100,10 @@ def test_at_most_two_causes_are_named_with_their_share():
 def test_discrepancy_without_a_cause_asks_for_another_form():
     sheet = describe(Discrepancy(3.0, 1.5, 0.05, "mm", relative_rms=0.01))
     assert "smooth over the whole sheet (3 times" in sheet and "[bubble.sheet]" in sheet
+    deck = describe(Discrepancy(3.0, 1.5, 0.05, "mm", relative_rms=0.01), has_law=False)
+    assert deck.endswith(
+        "the model is wrong, and the parameters are off by more than their bands say"
+    )
     strips = describe(Discrepancy(30.0, 9.0, 5.0, "N", specimen_count=5, relative_rms=0.02))
     assert "alike in all 5 specimens (Hotelling's F is 30" in strips
     assert "bubblefit compare" in strips and "[bubble.sheet]" not in strips

@@ -203,6 +203,11 @@ def test_verdict_says_by_how_much_a_fit_misses_what_it_was_made_of(share, state)
     )
     parameters = verdict_of_parameters([], notes, misfit_of)
     assert parameters.reasons == verdict.reasons
+    assert "bubblefit compare" in verdict.next_step
+    # There are no laws to compare.
+    wrong_form = verdict_of_parameters([], [Note(DISCREPANCY, "words")], {})
+    for of_deck in (parameters, wrong_form):
+        assert of_deck.next_step.startswith("look for wrong data (bubblefit check), then for what")
 
 
 def test_parameters_of_decks_are_known_within_a_fifth_of_their_value():
