@@ -339,11 +339,15 @@ def rejected_at_zero(view: MeasuredView) -> Iterator[Doubt]:
     displacement = view.last.displacement[view.inner(view.last)]
     count = len(displacement)
     still = int((displacement == 0).all(axis=1).sum())
-    at_origin = int((view.last.points == 0).all(axis=1).sum())
+    is_at_origin = (view.last.points == 0).all(axis=1)
+    at_origin = int(is_at_origin.sum())
+    rows = np.column_stack([view.last.points, view.last.displacement])[~is_at_origin]
+    # Where rows of other points are repeated as often, so is that of the centre.
+    repeats = np.unique(rows, axis=0, return_counts=True)[1].max(initial=1)
     signs = []
     if still > 0:
         signs.append(f"{still} of {count} points well within the rim do not move at all")
-    if at_origin > 1:
+    if at_origin > repeats:
         signs.append(f"{at_origin} points lie at exactly x = y = 0")
     if signs:
         text = (

@@ -259,6 +259,13 @@ def test_limits_of_point_doubts(check, name, count, sure, words, seen):
     assert_doubted(check, count, name, sure, *words, **seen)
 
 
+def test_repeated_rows_are_no_zero_points():
+    points = np.vstack([FIVE_POINTS, FIVE_POINTS])
+    view = {"fields": (field_of(0.2, np.ones((10, 3)), points),)}
+    assert_doubted(doubts.rejected_at_zero, 0, "zero-points", True, **view)
+    assert_doubted(doubts.repeated_points, 1, "repeated-points", False, "5 of 10 moving", **view)
+
+
 def rim(**other):
     usual = {"x": 0.0, "y": 0.0, "error": 0.1, "angle": 0.0, "turn_error": 0.1}
     return SimpleNamespace(**(usual | other))
