@@ -527,6 +527,7 @@ class BubbleKind(BaseKind):
         "height-falls",
         "height-unit",
         "not-zeroed",
+        "left-out",
     )
     read = staticmethod(read)
     prepare = LazyFunction(f"{__name__}.prepared_readings", "prepare")

@@ -172,6 +172,13 @@ def _doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt
             doubts += _doubts_of_heights(series, test.outline.radius)
             if test.height_offset is None:
                 doubts += _doubts_of_zero(series)
+    left_out = max((series.left_out for series in readings.series), default=0)
+    if left_out and test.inflation == 1:
+        words = (
+            f"{left_out} readings under pressure are left out: they are of a release or of another "
+            "inflation, if rows are in order of time; put them in order, or choose by inflation = N"
+        )
+        doubts.append(Doubt("left-out", False, words))
     return doubts
 
 

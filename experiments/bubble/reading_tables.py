@@ -127,13 +127,14 @@ def _heights(
     places = section.places or [[0.0, 0.0]]
     quantities = [f"height {number + 1}" for number in range(len(places))]
     tables = _tables(section, place, "data.heights", ["pressure", *quantities], files)
-    table = _loadings(tables, inflation)
+    table, left_out = _loadings(tables, inflation)
     series = []
     for quantity, xy in zip(quantities, places, strict=True) if len(table) else ():
         label = f"{quantity if places.count(xy) > 1 else 'height'} at ({xy[0]:g}, {xy[1]:g}) mm"
         positions = np.tile(xy, (len(table), 1))
         heights = _series("height", label, table, quantity, positions)
-        series.append(replace(heights, at_rest=_height_at_rest(tables, quantity)))
+        at_rest = _height_at_rest(tables, quantity)
+        series.append(replace(heights, at_rest=at_rest, left_out=left_out))
     return [replace(s, moves_with_sheet=section.moves_with_sheet) for s in series]
 
 
@@ -166,7 +167,8 @@ def _profiles(
         return []
     under_pressure = _with_pressures(tables, place, pressures)
     lines = _with_axes(under_pressure, section, files[first:])
-    points = _profiles_of_inflation(lines, inflation)
+    points, left_out = _profiles_of_inflation(lines, inflation)
+    moves = section.moves_with_sheet
     series = []
     for axis, line in points.groupby("axis", sort=False):
         angle = np.radians(_direction_of_line(str(axis).lower(), place))
@@ -174,7 +176,7 @@ def _profiles(
         table = pd.concat(profiles)
         positions = np.outer(table["coordinate"], [np.cos(angle), np.sin(angle)])
         heights = _series("height", f"heights along {axis}", table, "height", positions)
-        series.append(replace(heights, moves_with_sheet=section.moves_with_sheet))
+        series.append(replace(heights, moves_with_sheet=moves, left_out=left_out))
     return series
 
 
@@ -211,8 +213,12 @@ def _with_axes(
     return [table.assign(axis=axis) for table, axis in zip(tables, axes, strict=True)]
 
 
-def _profiles_of_inflation(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
-    """Return the rows of one inflation of each line of each specimen, which get numbers.
+def _profiles_of_inflation(
+    tables: Sequence[pd.DataFrame], inflation: int
+) -> tuple[pd.DataFrame, int]:
+    """Return the rows of one inflation of each line of each specimen, and the number of others.
+
+    The specimens get numbers, and rows without pressure do not count.
 
     Tables of a pressure each are in order of time; one of several pressures begins at rest.
     """
@@ -227,8 +233,11 @@ def _profiles_of_inflation(tables: Sequence[pd.DataFrame], inflation: int) -> pd
     parts: list[pd.DataFrame] = []
     for _, line in points.groupby(["recording", "axis", "specimen"], sort=False):
         parts += _runs_of_inflation(line, inflation)
+    least = LIMITS.least_pressure * points["pressure"].max()
+    loaded = int((points["pressure"] > least).sum())
     points = pd.concat(parts).sort_index()
-    return points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
+    points = points[points["pressure"] > least]
+    return points, loaded - len(points)
 
 
 def _runs_of_inflation(line: pd.DataFrame, inflation: int) -> list[pd.DataFrame]:
@@ -282,7 +291,7 @@ def _apex(
         problem = "name one: curvature_warp, curvature_fill, strain_warp or strain_fill"
         raise place.error("data.apex.columns", problem)
     tables = _tables(section, place, "data.apex", ["pressure", *quantities], files)
-    table = _loadings(tables, inflation)
+    table, left_out = _loadings(tables, inflation)
     series = []
     for name in quantities if len(table) else ():
         quantity: Quantity = "curvature" if name.startswith("curvature") else "strain"
@@ -296,6 +305,7 @@ def _apex(
                 value=section.measure(quantity, at_apex.value),
                 direction=(float(np.cos(angle)), float(np.sin(angle))),
                 span=span,
+                left_out=left_out,
             )
         )
     return series
@@ -452,16 +462,21 @@ def _named_columns(table: MachineTable, named: Sequence[str]) -> list[str]:
     return columns
 
 
-def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
-    """Return the rows of one inflation of all specimens, which get numbers.
+def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> tuple[pd.DataFrame, int]:
+    """Return the rows of one inflation of all specimens, and the number of others under pressure.
+
+    The specimens get numbers.
 
     Of more readings of a specimen than `LIMITS.max_readings`, neighbours are averaged.
     """
     parts: list[pd.DataFrame] = []
+    left_out = 0
     for table in tables:
         labels = table["specimen"] if "specimen" in table else np.zeros(len(table))
         for _, specimen in table.groupby(labels, sort=False):
-            rows = loading_rows(specimen["pressure"].to_numpy(float), inflation)
+            pressure = specimen["pressure"].to_numpy(float)
+            rows = loading_rows(pressure, inflation)
+            left_out += int((pressure > LIMITS.least_pressure * pressure.max()).sum()) - len(rows)
             loading = specimen.iloc[rows].drop(columns=["specimen", "axis"], errors="ignore")
             count = len(rows)
             group = np.arange(count) * min(count, LIMITS.max_readings) // max(count, 1)
@@ -469,7 +484,7 @@ def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
             means = loading.assign(pressure=np.cbrt(loading["pressure"])).groupby(group).mean()
             means["pressure"] **= 3
             parts.append(means.assign(specimen=len(parts)))
-    return pd.concat(parts) if parts else pd.DataFrame()
+    return pd.concat(parts) if parts else pd.DataFrame(), left_out
 
 
 def loading_rows(pressure: Array, inflation: int) -> NDArray[np.intp]:

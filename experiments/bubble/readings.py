@@ -90,6 +90,8 @@ class ReadingSeries:
         Length over which a curvature or a strain is measured.
     at_rest : float, mm, or None
         Mean height that was read without pressure before the first inflation.
+    left_out : int
+        Number of readings under pressure that are of releases and of other inflations.
     """
 
     quantity: Quantity
@@ -102,6 +104,7 @@ class ReadingSeries:
     direction: tuple[float, float] = (1.0, 0.0)
     span: float = 0.0
     at_rest: float | None = None
+    left_out: int = 0
 
     @property
     def unit(self) -> ReadingUnit:

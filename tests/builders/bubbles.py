@@ -116,6 +116,7 @@ MISTAKES_WITH_OWN_TESTS = {
     "height-falls": True,
     "height-unit": True,
     "not-zeroed": False,
+    "left-out": False,
     "loaded-reference": False,
 }
 BUBBLE_MISTAKES = {

@@ -113,6 +113,22 @@ def test_gauge_that_was_not_zeroed_is_doubted(heights, offset, doubt):
         assert names == (doubt if not nuisance else [])
 
 
+@pytest.mark.parametrize(("order", "left_out"), [("rising", 0), ("release", 3), ("shuffled", 5)])
+def test_readings_of_a_release_that_are_left_out_are_counted(heights, order, left_out):
+    rows = np.arange(len(PRESSURES))
+    rows = {"rising": rows, "release": [*rows, 4, 2, 0], "shuffled": [3, 0, 2, 5, 1, 4]}[order]
+    pressures = [0.0, *np.array(PRESSURES)[rows]]
+    read = [[0.0, *heights[0][rows]]]
+    keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
+    doubts = prepared_of(bf.Bubble.heights(pressures, read, **keys)).doubts(None)
+    assert [doubt.name for doubt in doubts] == ["left-out"] * (left_out > 0)
+    assert not left_out or doubts[0].text.startswith(f"{left_out} readings under pressure are left")
+    second = [0.0, *PRESSURES, 0.0, *PRESSURES]
+    read = [[0.0, *heights[0], 0.0, *heights[0]]]
+    bubble = bf.Bubble.heights(second, read, inflation=2, **keys)
+    assert not prepared_of(bubble).doubts(None)
+
+
 def test_heights_of_the_centre_give_a_modulus_in_closed_form(heights):
     estimate = prepared_of(gauged(heights)).closed_form(LAW)
     assert len(estimate.modulus) == len(PRESSURES)
