@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
     from .runs.validation import validate
-    from .runs.verification.verification import verify
+    from .runs.verification.verify import verify
     from .runs.weight_study import weights
 
 __all__ = [
@@ -110,7 +110,7 @@ _NAMES = {
     "runs.result": "Fit",
     "runs.simulation": "simulate",
     "runs.validation": "validate",
-    "runs.verification.verification": "verify",
+    "runs.verification.verify": "verify",
     "runs.weight_study": "weights",
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}

@@ -58,7 +58,7 @@ def verify_command(
     part where `bubblefit doctor` finds a usable one.
     """
     from ..runs.folder import check_unused
-    from ..runs.verification.verification import verify
+    from ..runs.verification.verify import verify
 
     folder = out or Path("out/verified")
     check_unused(folder, resume=False, overwrite=overwrite)

@@ -45,7 +45,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "runs.bootstrap:bootstrap,Bootstrap",
          "runs.validation:validate,judge_cards,Validation",
          "runs.weight_study:weights,WeightStudy",
-         "runs.verification.verification:verify,Verification",
+         "runs.verification.verify:verify,Verification",
          "runs.estimate:estimate"),
     ),
     "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.base",

@@ -194,8 +194,8 @@ class GaugedBubble:
             self.keys[key] = unit
             self.remarks[key] = "assumed, as a heading names no unit"
 
-    def with_decimal(self, table: MachineTable, columns: Sequence[str]) -> MachineTable:
-        """Return a table with the decimal mark of columns.
+    def settle_decimal(self, table: MachineTable, columns: Sequence[str]) -> str:
+        """Make the decimal mark of columns a key if it has to be assumed, and return it.
 
         Commas are assumed to be decimal ones where all of them may mark thousands as well.
         """
@@ -206,11 +206,10 @@ class GaugedBubble:
             for line, cell in zip(texts.lines.tolist(), texts.text(name), strict=True)
         ]
         try:
-            decimal = decimal_mark(texts.path, cells)
+            return decimal_mark(texts.path, cells)
         except InputError:
-            decimal = self.keys["decimal"] = ","
             self.remarks["decimal"] = 'assumed; or "." if commas mark thousands'
-        return replace(table, table=replace(texts, decimal=decimal))
+            return self.keys.setdefault("decimal", ",")
 
 
 def read_heights(file: Path) -> GaugedBubble:
@@ -229,7 +228,7 @@ def read_heights(file: Path) -> GaugedBubble:
         gauges.keys["columns"] = {"height": heights}
     gauges.add_unit("pressure_unit", table, [pressure], "kPa")
     gauges.add_unit("length_unit", table, heights, "mm")
-    gauges.with_decimal(table, [pressure, *heights])
+    gauges.settle_decimal(table, [pressure, *heights])
     return gauges
 
 
@@ -272,7 +271,7 @@ def read_profiles(file: Path) -> GaugedBubble:
     profiles = GaugedBubble("profiles", has_pressure=bool(pressures))
     profiles.add_unit("pressure_unit", table, [table.names[i] for i in pressures], "kPa")
     profiles.add_unit("length_unit", table, [coordinate, height], "mm")
-    profiles.with_decimal(table, [coordinate, height, *(table.names[i] for i in pressures)])
+    profiles.settle_decimal(table, [coordinate, height, *(table.names[i] for i in pressures)])
     return profiles
 
 
@@ -290,7 +289,8 @@ def read_apex(file: Path) -> GaugedBubble:
         raise InputError(file, f"line {table.header}", "no curvature or strain along warp or fill")
     apex = GaugedBubble("apex", {"columns": columns})
     pressure = table.column("pressure")
-    table = apex.with_decimal(table, [pressure, *columns.values()])
+    decimal = apex.settle_decimal(table, [pressure, *columns.values()])
+    table = replace(table, table=replace(table.table, decimal=decimal))
     apex.add_unit("pressure_unit", table, [pressure], "kPa")
     curvatures = [name for key, name in columns.items() if key.startswith("curvature")]
     if curvatures:

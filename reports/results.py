@@ -9,7 +9,7 @@ from ..runs.folder import FailedRun, Presented
 from ..runs.predictions import Predictions
 from ..runs.result import Fit
 from ..runs.simulation import Histories, SimulatedTests
-from ..runs.verification.verification import Verification
+from ..runs.verification.verify import Verification
 from . import fit_page, maps, run_pages
 from .vega import Drawing
 

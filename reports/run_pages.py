@@ -29,7 +29,7 @@ from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, versions, write_
 from ..runs.predictions import Predictions
 from ..runs.simulation import SimulatedTests
 from ..runs.verdict import answers
-from ..runs.verification.verification import Verification
+from ..runs.verification.verify import Verification
 from ..storage.writing import json_text, write_text
 from ..version import __version__
 from ..wording import percent

@@ -7,7 +7,7 @@ far off all others, are left out of a fit, too.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -236,21 +236,19 @@ class MeasuredView:
     @cached_property
     def clamp(self) -> Rim | None:
         """Find the edge of the clamp; None where no points stand still around a disk that rises."""
-        outline = self.outline
-        if not self.surfaces:
-            return None
-        return clamp_of_motion(self.surfaces, (outline.major, outline.minor), outline.angle)
+        return self._find_rim(clamp_of_motion, self.outline.angle)
 
     @cached_property
     def rim(self) -> Rim | None:
-        """Find the rim and the turn of an ellipse; None where points do not reach all around it.
+        """Find the rim and the turn of an ellipse; None where points do not reach all around it."""
+        return self._find_rim(rim_of_motion)
 
-        It is None, too, where no field rises.
-        """
-        if not self.surfaces:  # nor a rim
+    def _find_rim(self, search: Callable[..., Rim | None], *angle: float) -> Rim | None:
+        """Search the fields that rise for a rim; None where there are none, or too few points."""
+        if not self.surfaces:
             return None
         try:
-            return rim_of_motion(self.surfaces, (self.outline.major, self.outline.minor))
+            return search(self.surfaces, (self.outline.major, self.outline.minor), *angle)
         except InputError:
             return None
 

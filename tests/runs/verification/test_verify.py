@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.runs.verification import SUBJECTS, Number, bubbles
-from bubblefit.runs.verification.verification import verify
+from bubblefit.runs.verification.verify import verify
 
 from ...builders.laws import TABLE_4_2
 from ...support.refusals import raised
