@@ -10,7 +10,7 @@ from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
 from bubblefit.runs.folder import Provenance
-from bubblefit.runs.verification import verification
+from bubblefit.runs.verification import verify as verification
 
 from ..builders.pages import drawn, full_report
 from ..support.commands import in_process, one_line
