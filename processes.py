@@ -109,7 +109,8 @@ class Copies(Generic[M, V]):
         """
         for copy, share in self._copies:
             copy.send([(k, messages[k]) for k in share])
-        results = {k: self._do(k, messages[k]) for k in self._own_share}
+        with temporary_value(_scope, None):  # a task makes no copies itself
+            results = {k: self._do(k, messages[k]) for k in self._own_share}
         for copy, share in self._copies:
             values = copy.receive()
             if values is None:
@@ -194,6 +195,7 @@ class _Copy:
             try:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process copied decides
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
+                _scope.set(None)  # a task makes no copies itself
                 while True:
                     connection.send([do(k, message) for k, message in connection.recv()])
             finally:

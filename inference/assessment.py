@@ -18,7 +18,7 @@ from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw, ThicknessChange
 from ..meshes.bubble_model import BubbleModel
 from ..notes import Note
-from ..processes import run_side_by_side
+from .comparison import run_tasks_of
 from .discrepancy import (
     SMOOTH_DEGREE,
     Cause,
@@ -370,10 +370,7 @@ def discrepancies(
         return replace(discrepancy, relative_rms=relative_rms)
 
     comparisons = problem.comparisons
-    if all(comparison.may_run_aside for comparison in comparisons):
-        by_number = run_side_by_side(discrepancy_of, len(comparisons))
-    else:
-        by_number = list(map(discrepancy_of, range(len(comparisons))))
+    by_number = run_tasks_of(comparisons, discrepancy_of, len(comparisons))
     return {
         comparison.name: discrepancy
         for comparison, discrepancy in zip(comparisons, by_number, strict=True)

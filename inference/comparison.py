@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import scipy
@@ -13,10 +13,12 @@ from ..errors import InputError, SolverFailure
 from ..light_dataclasses import dataclass
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
+from ..processes import run_side_by_side
 from ..solvers.base import DifferentiatingSolver, History, Solver
 from .nuisance import Nuisance
 from .objective import Objective
 
+V = TypeVar("V")
 SparseArray = Any  # scipy.sparse.csc_array, which has no types
 #: Largest predicted change of the displacements, relative to the largest, for a warm start. A far
 #: guess can lead to another equilibrium branch (a soft membrane may fold), on which a fit then
@@ -376,3 +378,13 @@ class Comparison:
     def _guess(self, parameters: Array) -> Array | None:
         """Return the path that the last run suggests at parameters (p,); None if there was none."""
         return None if self.warm_start is None else self.warm_start.guess(parameters)
+
+
+def run_tasks_of(comparisons: Sequence[Comparison], do: Callable[[int], V], count: int) -> list[V]:
+    """Return the results of tasks on comparisons, done by copies of this process where it may.
+
+    The tasks are numbered from 0 to `count` - 1, and count as equally long.
+    """
+    if all(comparison.may_run_aside for comparison in comparisons):
+        return run_side_by_side(do, count)
+    return [do(number) for number in range(count)]

@@ -27,7 +27,7 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from ..processes import copies_for
 from ..solvers.base import History
-from .comparison import Comparison
+from .comparison import Comparison, run_tasks_of
 from .descent import MIN_BLOCK_NORM, bounded_step, with_small_diagonal
 from .noise import Noise, misfits
 from .nuisance import Nuisance
@@ -582,19 +582,32 @@ def _slope_changes(
     sigma = np.linalg.norm(directions.T @ linear.noise_response, axis=1)
     steps = np.clip(settings.step_sigmas * sigma, settings.min_step, settings.max_step)
     weighted = linear.weights**2 * best.residual
-    changes = []
-    differentiated = []
-    for k, (direction, step) in enumerate(zip(directions.T, steps, strict=True)):
-        neighbour, sign = _neighbour(problem, best, linear.sizes * direction * step)
+    jacobian = best.jacobian
+    states = [comparison.state for comparison in problem.comparisons]
+    previous_analyses = problem.analyses
+
+    def change_along(number: int) -> tuple[Array | None, int]:
+        """Return the change along a direction, None where it is not known, and the analyses."""
+        analyses = problem.analyses
+        for comparison, state in zip(problem.comparisons, states, strict=True):
+            comparison.state = state  # each direction begins alike, whatever was run before it
+        step = linear.sizes * directions[:, number] * steps[number]
+        neighbour, sign = _neighbour(problem, best, step)
         if neighbour is None or neighbour.jacobian is None:
-            continue
-        slope = (neighbour.jacobian - best.jacobian).T @ weighted / (sign * step)
-        changes.append(linear.sizes * slope)
-        differentiated.append(k)
-    if not changes:
+            return None, problem.analyses - analyses
+        slope = (neighbour.jacobian - jacobian).T @ weighted / (sign * steps[number])
+        return linear.sizes * slope, problem.analyses - analyses
+
+    changes = run_tasks_of(problem.comparisons, change_along, directions.shape[1])
+    problem.analyses = previous_analyses + sum(analyses for _, analyses in changes)
+    for comparison, state in zip(problem.comparisons, states, strict=True):
+        comparison.state = state
+    differentiated = [k for k, (change, _) in enumerate(changes) if change is not None]
+    if not differentiated:
         empty = np.zeros((len(linear.sizes), 0))
         return empty, empty
-    return directions[:, differentiated], np.array(changes).T
+    terms = np.array([change for change, _ in changes if change is not None])
+    return directions[:, differentiated], terms.T
 
 
 def _symmetric(directions: Array, changes: Array) -> Array:

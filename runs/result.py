@@ -49,6 +49,7 @@ from ..materials.card import MaterialCard, ModulusBand
 from ..materials.forms.base import COMPONENTS, Array, components_of
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, note_records
+from ..processes import run_side_by_side
 from ..project.project import Project
 from ..storage.writing import plain_values
 from ..version import __version__
@@ -310,18 +311,21 @@ class Fit(Reported):
             return {}
         leading = self.problem.differentiating
         names = [comparison.name for comparison in self.problem.comparisons]
-        pinned = {}
-        for test, fitted in self.tests.items():
-            pinned[test] = moduli_from(
+        tests = [*self.tests.values()]
+
+        def pinned_by(number: int) -> dict[str, ReportedModulus]:
+            return moduli_from(
                 leading,
                 point,
                 certainty.reported,
                 self.law,
                 certainty.strain,
-                [names.index(comparison.name) for comparison in fitted.comparisons],
+                [names.index(comparison.name) for comparison in tests[number].comparisons],
                 certainty.noise.residual_sigma,
             )
-        return {**pinned, TOGETHER: certainty.moduli}
+
+        pinned = zip(self.tests, run_side_by_side(pinned_by, len(tests)), strict=True)
+        return {**dict(pinned), TOGETHER: certainty.moduli}
 
     @cached_property
     def sensitivity(self) -> dict[str, dict[str, Array]]:

@@ -11,6 +11,7 @@ from bubblefit.processes import (
     copies_for,
     cores,
     may_run_at_once,
+    run_side_by_side,
     share_cores,
     share_of_cores,
 )
@@ -64,6 +65,17 @@ def test_no_copies_are_made_where_none_are_allowed_or_needed():
     with may_run_at_once(2):
         assert copies_for(do, [1.0]) is None
         assert copies_for(do, [1.0, 0.0001]) is None
+
+
+def test_tasks_of_copies_make_no_copies():
+    def do(number):
+        return os.getpid(), run_side_by_side(lambda _: os.getpid(), 2)
+
+    with may_run_at_once(2):
+        (first, below_first), (second, below_second) = run_side_by_side(do, 2)
+        assert first == os.getpid() != second
+        assert below_first == [first, first] and below_second == [second, second]
+        assert len({*run_side_by_side(lambda _: os.getpid(), 2)}) == 2
 
 
 def test_other_copies_take_the_place_of_the_first():

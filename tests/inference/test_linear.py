@@ -35,6 +35,7 @@ from bubblefit.inference.problem import Evaluation
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.processes import may_run_at_once
 from bubblefit.runs import certainty as fit_certainty
 from bubblefit.runs.certainty import certainty_of_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -317,6 +318,22 @@ def test_second_order_curvature_from_the_failed_side_is_equal(
     monkeypatch.setattr(fit, "evaluate", down_alone)
     down = second_order_terms(fit, best, noise, settings).hessian_term
     assert down == pytest.approx(up, abs=0.02 * np.abs(up).max())
+
+
+def test_directions_side_by_side_give_the_second_order_of_one_after_the_other(
+    constants_fitted_to_cubic,
+):
+    fit, best, noise = constants_fitted_to_cubic
+
+    def terms(processes):
+        analyses = fit.analyses
+        with may_run_at_once(processes):
+            second = second_order_terms(fit, best, noise)
+        return second, fit.analyses - analyses
+
+    (alone, analyses), (together, analyses_together) = terms(1), terms(2)
+    np.testing.assert_array_equal(together.hessian_term, alone.hessian_term)
+    assert analyses_together == analyses == alone.analyses == together.analyses == 3
 
 
 def test_second_order_is_used_where_definite_and_not_negligible(

@@ -10,6 +10,7 @@ import pytest
 from bubblefit.errors import InputError, OutputError
 from bubblefit.materials.card import write_card
 from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.processes import may_run_at_once
 from bubblefit.reports.presenter import page_presenter_of
 from bubblefit.runs.result import COMPARED, TOGETHER, notes_of_pinned
 from bubblefit.runs.verdict import answers
@@ -116,6 +117,16 @@ def test_all_tests_and_quantities_together_have_the_sigma_of_the_fit(fitted, str
             np.testing.assert_allclose(together[name], expected)
         for alone in fit.sensitivity.values():
             assert all((alone[name] >= (1 - 1e-9) * together[name]).all() for name in together)
+
+
+def test_tests_looked_at_side_by_side_pin_the_same_moduli(strips_fit):
+    with may_run_at_once(2):
+        pinned = type(strips_fit).pinned.func(strips_fit)
+    assert list(pinned) == list(strips_fit.pinned)
+    for source, moduli in pinned.items():
+        for name, modulus in moduli.items():
+            np.testing.assert_array_equal(modulus.upper, strips_fit.pinned[source][name].upper)
+            np.testing.assert_array_equal(modulus.sigma, strips_fit.pinned[source][name].sigma)
 
 
 def test_modulus_that_a_test_alone_determines_nowhere_is_noted():
