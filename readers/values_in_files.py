@@ -335,13 +335,7 @@ def _number_by_pattern(
         The pattern takes too long or does not fit, its group holds no number, or another unit
         stands right behind it.
     """
-    has_several_repeats = len(_REPEATS.findall(pattern)) > 1
-    if has_several_repeats and not ends_within(SEARCH_SECONDS, partial(_search, pattern, path)):
-        problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
-        raise InputError(path, field, problem)
-    match = _search(pattern, path)
-    if match is None:
-        raise InputError(path, field, f"the file's name does not fit the pattern {pattern!r}")
+    match = _match(path, pattern, field)
     # A group of two whole numbers is one with decimals.
     text = re.sub(r"(?<=\d)[_ p-](?=\d+$)", ".", match[1] or "")
     try:
@@ -356,6 +350,18 @@ def _number_by_pattern(
         problem = f"{behind[1]} stands behind the number, which {pattern!r} reads in {base_unit}"
         raise InputError(path, field, problem)
     return number * size
+
+
+def _match(path: Path, pattern: str, field: str) -> re.Match[str]:
+    """Return where a pattern fits the file's name; InputError where it does not, or takes long."""
+    has_several_repeats = len(_REPEATS.findall(pattern)) > 1
+    if has_several_repeats and not ends_within(SEARCH_SECONDS, partial(_search, pattern, path)):
+        problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
+        raise InputError(path, field, problem)
+    match = _search(pattern, path)
+    if match is None:
+        raise InputError(path, field, f"the file's name does not fit the pattern {pattern!r}")
+    return match
 
 
 def _search(pattern: str, path: Path) -> re.Match[str] | None:

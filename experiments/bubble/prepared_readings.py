@@ -13,7 +13,9 @@ from ...inference.comparison import Comparison
 from ...inference.objective import Objective
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.disk import Outline
 from ...meshes.sampling import SmoothReading
+from ...solvers.base import Array
 from ..base import MakeSolver, Masks, Weighting
 from ..cap import CapEstimate
 from ..data_files import DataFile, joined
@@ -22,7 +24,7 @@ from . import BubbleTest, prepared
 from .nuisance import reading_nuisance
 from .prepared import OBJECTIVES, PreparedInflation
 from .reading_objective import ReadingObjective, reader_of
-from .readings import GaugeReadings, ReadingSeries
+from .readings import LIMITS, GaugeReadings, ReadingSeries
 from .sheet import FLAT, MeasuredSheet
 
 #: Largest distance of a gauge that reads the apex from the centre, as a share of the radius.
@@ -110,6 +112,11 @@ class PreparedReadings(PreparedInflation):
 
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
         """Return the estimate by mean heights of the centre; None where there are none."""
+        central = self._central_heights()
+        return None if central is None else prepared.closed_form_of(self.test, *central, law)
+
+    def _central_heights(self) -> tuple[Array, Array] | None:
+        """Return pressures (n,), MPa, rising, and mean heights of the centre at them, mm."""
         pressures = []
         heights = []
         for series in self.readings.series:
@@ -122,14 +129,18 @@ class PreparedReadings(PreparedInflation):
             return None
         levels, level_of = np.unique(np.concatenate(pressures), return_inverse=True)
         sums = np.bincount(level_of, np.concatenate(heights), len(levels))
-        return prepared.closed_form_of(self.test, levels, sums / np.bincount(level_of), law)
+        return levels, sums / np.bincount(level_of)
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the tables that were read."""
         return joined(self.readings.files)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        return _doubts_of_readings(self.test, self.readings)
+        doubts = _doubts_of_readings(self.test, self.readings)
+        central = self._central_heights()
+        if central is not None and not any(doubt.sure for doubt in doubts):
+            doubts += _doubts_of_modulus(self.test, *central, expected)
+        return doubts
 
 
 def prepare(
@@ -153,6 +164,10 @@ class PlausibleReadings:
     #: Exponent of the height as a power of the pressure: 1/3 for a flat elastic sheet, 1 for a
     #: tense one; above 1 height and pressure are exchanged.
     exponents: tuple[float, float] = (0.1, 1.3)
+    #: Radius of the disk over the one that is stated, by the fall of heights from the centre.
+    radius_ratio: tuple[float, float] = (0.56, 1.8)
+    max_dome: float = 0.6  # largest height, over the radius, of a dome that is about a paraboloid
+    min_reach: float = 0.2  # smallest distance from the centre, over the radius, that shows a fall
 
 
 PLAUSIBLE = PlausibleReadings()
@@ -172,6 +187,8 @@ def _doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt
             doubts += _doubts_of_heights(series, test.outline.radius)
             if test.height_offset is None:
                 doubts += _doubts_of_zero(series)
+    if test.height_offset is None:
+        doubts += _doubts_of_shape(readings, test.outline)
     left_out = max((series.left_out for series in readings.series), default=0)
     if left_out and test.inflation == 1:
         words = (
@@ -191,6 +208,61 @@ def _doubts_of_zero(series: ReadingSeries) -> Iterator[Doubt]:
             "rest; subtract it, or let [bubble.nuisance] height_offset find it"
         )
         yield Doubt("not-zeroed", False, words)
+
+
+def _doubts_of_shape(readings: GaugeReadings, outline: Outline) -> Iterator[Doubt]:
+    """Yield a doubt if heights fall from the centre as on a disk of quite another radius."""
+    ratio = _ratio_of_radii(readings, outline)
+    low, high = PLAUSIBLE.radius_ratio
+    if not low < ratio < high:
+        radius = outline.radius
+        fall = f"as on a disk of radius {ratio * radius:.3g} mm" if ratio < np.inf else "nowhere"
+        words = (
+            f"the heights fall from the centre {fall}, and the project says {radius:.3g} mm: is "
+            "the radius right (not the diameter), and the places of the gauges?"
+        )
+        yield Doubt("radius", False, words)
+
+
+def _ratio_of_radii(readings: GaugeReadings, outline: Outline) -> float:
+    """Return the radius by the fall of the heights over that of the outline; 1 if it is not told.
+
+    At the largest pressure a sheet is about a paraboloid, which is zero on the rim.
+    """
+    heights = [s for s in readings.series if s.quantity == "height"]
+    if not heights:
+        return 1.0
+    pressure = np.concatenate([s.pressure for s in heights])
+    rows = pressure > (1 - LIMITS.pressure_scatter) * pressure.max()
+    squares = np.concatenate([outline.share(s.positions) ** 2 for s in heights])[rows]
+    height = np.concatenate([s.value - (s.at_rest or 0.0) for s in heights])[rows]
+    if np.ptp(squares) < PLAUSIBLE.min_reach**2:
+        return 1.0
+    slope, apex = np.polyfit(squares, height, 1)
+    if not 0 < apex < PLAUSIBLE.max_dome * outline.radius:
+        return 1.0
+    return float(np.sqrt(apex / -slope)) if slope < 0 else np.inf
+
+
+def _doubts_of_modulus(
+    test: BubbleTest, pressures: Array, heights: Array, expected: Expected
+) -> Iterator[Doubt]:
+    """Yield a doubt if heights (n,), mm, of the centre call for a modulus far beyond the bounds."""
+    if not expected.moduli:
+        return
+    law = HypoelasticLaw.linear(1.0, 1.0, 1.0)
+    estimate = prepared.closed_form_of(test, pressures, heights, law)
+    if estimate is None:
+        return
+    modulus = (1 - law.nu12) * float(estimate.stress[-1] / estimate.strain[-1])
+    beyond_bounds = expected.outside(modulus, ("E1", "E2"))
+    if beyond_bounds:
+        words = (
+            f"the height at {1e3 * pressures[-1]:.4g} kPa calls for a modulus of about "
+            f"{beyond_bounds}: are pressure and height in the units that are said, and radius "
+            "(not the diameter) and thickness right?"
+        )
+        yield Doubt("pressure-unit", True, words)
 
 
 def _doubts_of_heights(series: ReadingSeries, radius: float) -> Iterator[Doubt]:

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.prepared_readings import PreparedReadings
+from bubblefit.experiments.doubts import UNKNOWN, Expected
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.gauges import LAW, PRESSURES, THICKNESS, gauge_heights
@@ -75,7 +76,7 @@ def test_three_gauges_tell_warp_from_fill(heights):
 
 def test_doubts_of_heights(heights):
     prepared = prepared_of(gauged(heights[:1], places=None))
-    expected = None
+    expected = UNKNOWN
 
     def doubt_names(**changes):
         series = replace(prepared.readings.series[0], **changes)
@@ -98,7 +99,9 @@ def test_doubts_of_heights(heights):
     assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert doubt_names(value=apex[:1], pressure=np.array(PRESSURES[:1])) == []
+        single = {"positions": np.zeros((1, 2)), "specimens": np.zeros(1, dtype=int)}
+        pressure = np.array(PRESSURES[:1])
+        assert doubt_names(value=apex[:1], pressure=pressure, **single) == []
 
 
 @pytest.mark.parametrize(("offset", "doubt"), [(0.0, []), (0.3, []), (3.0, ["not-zeroed"])])
@@ -109,7 +112,7 @@ def test_gauge_that_was_not_zeroed_is_doubted(heights, offset, doubt):
     keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
     for nuisance in ({}, {"height_offset": 5.0}):
         bubble = bf.Bubble.heights(pressures, read, nuisance=nuisance, **keys)
-        names = [found.name for found in prepared_of(bubble).doubts(None)]
+        names = [found.name for found in prepared_of(bubble).doubts(UNKNOWN)]
         assert names == (doubt if not nuisance else [])
 
 
@@ -120,13 +123,38 @@ def test_readings_of_a_release_that_are_left_out_are_counted(heights, order, lef
     pressures = [0.0, *np.array(PRESSURES)[rows]]
     read = [[0.0, *heights[0][rows]]]
     keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
-    doubts = prepared_of(bf.Bubble.heights(pressures, read, **keys)).doubts(None)
+    doubts = prepared_of(bf.Bubble.heights(pressures, read, **keys)).doubts(UNKNOWN)
     assert [doubt.name for doubt in doubts] == ["left-out"] * (left_out > 0)
     assert not left_out or doubts[0].text.startswith(f"{left_out} readings under pressure are left")
     second = [0.0, *PRESSURES, 0.0, *PRESSURES]
     read = [[0.0, *heights[0], 0.0, *heights[0]]]
     bubble = bf.Bubble.heights(second, read, inflation=2, **keys)
-    assert not prepared_of(bubble).doubts(None)
+    assert not prepared_of(bubble).doubts(UNKNOWN)
+
+
+@pytest.mark.parametrize(
+    ("radius", "places", "changes", "names"),
+    [
+        (100.0, PLACES, {}, []), (200.0, PLACES, {}, ["radius", "pressure-unit"]),
+        (51.0, PLACES, {}, ["radius", "pressure-unit"]),
+        (100.0, [[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]], {}, []),
+        (100.0, PLACES, {"places": [[0.0, 0.0], [90.0, 0.0], [0.0, 90.0]]}, ["radius"]),
+        # Bar under a heading of kPa, and a height in cm.
+        (100.0, PLACES, {"pressures": 0.01}, ["pressure-unit"]),
+        (100.0, PLACES, {"heights": 0.1}, ["pressure-unit"]),
+        (200.0, None, {}, ["pressure-unit"]), (100.0, None, {}, []),
+    ],
+)  # fmt: skip
+def test_radius_and_units_of_gauges_are_judged(radius, places, changes, names):
+    heights = gauge_heights(places or [[0.0, 0.0]]).T * changes.get("heights", 1.0)
+    pressures = np.array(PRESSURES) * changes.get("pressures", 1.0)
+    keys = {"radius": radius, "elements": 48, "symmetry": "quarter", "noise": 0.05}
+    places = changes.get("places", places)
+    prepared = prepared_of(bf.Bubble.heights(pressures, heights, places=places, **keys))
+    bounds = {"E1": (500.0, 1000.0), "E2": (200.0, 1000.0)}
+    doubts = prepared.doubts(Expected(bounds))
+    assert [doubt.name for doubt in doubts] == names
+    assert [doubt.sure for doubt in doubts] == [name == "pressure-unit" for name in names]
 
 
 def test_heights_of_the_centre_give_a_modulus_in_closed_form(heights):
