@@ -216,7 +216,7 @@ def _doubts_of_shape(readings: GaugeReadings, outline: Outline) -> Iterator[Doub
     low, high = PLAUSIBLE.radius_ratio
     if not low < ratio < high:
         radius = outline.radius
-        fall = f"as on a disk of radius {ratio * radius:.3g} mm" if ratio < np.inf else "nowhere"
+        fall = f"as on a disk of radius {ratio * radius:.3g} mm" if ratio < 100 else "nowhere"
         words = (
             f"the heights fall from the centre {fall}, and the project says {radius:.3g} mm: is "
             "the radius right (not the diameter), and the places of the gauges?"
@@ -241,7 +241,7 @@ def _ratio_of_radii(readings: GaugeReadings, outline: Outline) -> float:
     slope, apex = np.polyfit(squares, height, 1)
     if not 0 < apex < PLAUSIBLE.max_dome * outline.radius:
         return 1.0
-    return float(np.sqrt(apex / -slope)) if slope < 0 else np.inf
+    return float(np.sqrt(apex / max(-slope, 1e-9 * apex)))
 
 
 def _doubts_of_modulus(

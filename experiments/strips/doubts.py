@@ -114,7 +114,7 @@ def _of_modulus(
     if unlikely:
         text = (
             f"{name}: load over strain is a modulus of about {unlikely}: are load and elongation "
-            "in the units that are said, and are width and thickness right?"
+            "in the units that are said and not exchanged, and are width and thickness right?"
         )
         yield Doubt("load-unit", True, text)
     elif unusual:
@@ -185,7 +185,8 @@ def _of_curve(
     if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
         text = (
             f"{name}: the curve ends at an elongation of {strain:.3g} gauge lengths: is it a length"
-            " in the unit that is said (not percent, not a strain), and is the gauge length right?"
+            " in the unit that is said (not percent, not a strain, not the load), and is the gauge "
+            "length right?"
         )
         yield Doubt("elongation-unit", True, text)
     yield from _of_beginning(name, elongation, load)

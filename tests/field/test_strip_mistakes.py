@@ -33,6 +33,11 @@ TRAPS = {
         {"fill": ENDS["fill"] / GAUGE / 1000},
         ("elongation-unit", True, "gauge lengths"),
     ),
+    "exchanged columns": (
+        changed_curve("warp", elongation=GOOD_WARP.load, load=GOOD_WARP.elongation),
+        {"warp": GOOD_WARP.load.max()},
+        ("elongation-unit", True, "not the load"),
+    ),
     "kN for N": (changed_curve("warp", load=GOOD_WARP.load / 1000), {}, ("load-unit", True, "MPa")),
     "N/m for N": (
         changed_curve("fill", load=GOOD_FILL.load / (1e-3 * WIDTH)),
