@@ -135,10 +135,12 @@ def compiled(internal: bool = False, **options: Any) -> Callable[[Any], Any]:
         sorting): references to arrays of their arguments are not counted, which takes half of the
         time of an integration point, and no way from Python is compiled.
     **options
-        Of `numba.njit`.
+        Of `numba.njit`; _nrt=False for a function that makes no array and is called from compiled
+        ones and from Python: references are not counted either.
     """
     # All options are given, as numba would otherwise take those of the function that calls it.
     # "_nrt": numba's run time, which counts references to arrays; no_cpython_wrapper: not callable
     # from Python.
-    options |= {"_nrt": not internal, "no_cpython_wrapper": internal, "no_cfunc_wrapper": True}
+    fixed = {"_nrt": not internal, "no_cpython_wrapper": internal, "no_cfunc_wrapper": True}
+    options = fixed | options
     return lambda function: Compiled(function, options)

@@ -317,6 +317,8 @@ class Comparison:
         if history.path is not None and history.path_slope is not None:
             self.warm_start = WarmStart(parameters, history.path, history.path_slope)
         by_parameter = self.objective.at(nuisance).jacobian(history, slope)
+        if all(n.model_parameter is not None and n.scale == 1.0 for n in self.nuisance):
+            return history, by_parameter
         by_nuisance = self._nuisance_columns(by_parameter[:, len(free) :], nuisance, history)
         return history, np.column_stack([by_parameter[:, : len(free)], *by_nuisance])
 

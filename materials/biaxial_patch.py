@@ -17,7 +17,7 @@ from ..compilation import compiled
 from .forms.base import Array
 from .law import HypoelasticLaw, law_slopes
 from .pieces import CompiledLaw, LawTangent, PointState, modulus_slopes, point_response
-from .point_law import stress_rate, stress_update
+from .point_law import stress_rates, stress_update
 
 #: Newton iterations of one load, and halvings of a step that does not come nearer.
 MAX_ITERATIONS = 60
@@ -277,17 +277,8 @@ def _take_slopes(  # type: ignore[no-untyped-def]
     arm1 = increment.thickness * math.exp(law.area_power * (h[0] + h[1]) - h[1])
     det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
     slopes = increment.written.slopes
+    stress_rates(slopes, law.coupling[0], of_moduli, of_law.coupling, dh, ds, ds)
     for j in range(count):
-        stress_rate(
-            slopes,
-            law.coupling[0],
-            of_moduli,
-            of_law.coupling,
-            j,
-            dh,
-            ds,
-            ds,
-        )
         a0 = ds[0, j]
         a1 = ds[1, j]
         r0 = arm0 * a0

@@ -163,7 +163,7 @@ def _mean_of_piece(
     return value + pieces[component, k, 3] * first + pieces[component, k, 4]
 
 
-@compiled()
+@compiled(_nrt=False)
 def point_modulus(pieces: Array, component: int, x: float) -> float:
     """Return a modulus (MPa) at a strain, constant beyond its range; pieces : (3, P, 5)."""
     size = abs(x) if component == 2 else x
@@ -173,7 +173,7 @@ def point_modulus(pieces: Array, component: int, x: float) -> float:
     return (value * in_range + pieces[component, k, 3]) * in_range + pieces[component, k, 4]
 
 
-@compiled()
+@compiled(_nrt=False)
 def integral_of(
     pieces: Array,
     component: int,
@@ -226,7 +226,7 @@ def _across(
     return mean, ahead, behind
 
 
-@compiled()
+@compiled(_nrt=False)
 def increment_modulus(
     pieces: Array,
     component: int,
@@ -308,7 +308,7 @@ def _add_way(
         start = end
 
 
-@compiled()
+@compiled(_nrt=False)
 def by_pieces(
     pieces: Array,
     component: int,
@@ -381,7 +381,7 @@ def by_pieces(
     return first, stop
 
 
-@compiled(inline="always")
+@compiled(internal=True)
 def modulus_slopes(  # type: ignore[no-untyped-def]
     law,
     of_law,

@@ -31,7 +31,7 @@ from .pieces import (
     increment_modulus,
 )
 
-#: Positions in the vector `slopes` (SLOPES entries) that `stress_update` writes for `stress_rate`.
+#: Positions in the vector `slopes` (SLOPES entries) that `stress_update` writes for `stress_rates`.
 #: D11_E1 is dD11/dE1 and so on, D11_NU dD11/dnu12; `stress_update` explains the others. At AHEAD
 #: and at BEHIND a (2, 2) matrix begins, at CRIMP one of (2, 3), all row by row.
 (
@@ -766,18 +766,17 @@ def _integrate(
     return True
 
 
-@compiled(inline="always")
-def stress_rate(
+@compiled(internal=True)
+def stress_rates(
     slopes: Array,
     nu: float,
     of_moduli: Array,
     by_coupling: Array,
-    j: int,
     old: Array,
     ds_old: Array,
     ds_new: Array,
 ) -> None:
-    """Write the derivative of the stress along the yarns by parameter j, at fixed end strain.
+    """Write the derivatives of the stress along the yarns by p parameters, at fixed end strain.
 
     Parameters
     ----------
@@ -790,34 +789,48 @@ def stress_rate(
         strains.
     by_coupling : (len(coupling), p) array
         `LawSlopes.coupling`.
-    j : int
-        Index of the parameter.
     old, ds_old : (3, p) array
         Derivatives of strain and stress (MPa) at the start of the increment by the parameters.
     ds_new : (3, p) array, MPa
-        Derivatives of the stress at the end; ds_new[:2, j] is written.
+        Derivatives of the stress at the end; ds_new[:2] is written. It may be `ds_old`.
     """
-    o0 = old[0, j]
-    o1 = old[1, j]
-    by_nu = by_coupling[0, j]
-    warp = of_moduli[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
-    fill = of_moduli[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
-    d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu * slopes[D11_NU]
-    d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu * slopes[D22_NU]
-    d12 = nu * d22 + by_nu * slopes[D22]
-    dh0 = slopes[TAKEN1]
-    dh1 = slopes[TAKEN2]
-    b0 = ds_old[0, j]
-    b1 = ds_old[1, j]
-    a0 = b0 + d11 * dh0 + d12 * dh1 - slopes[D11] * o0 - slopes[D12] * o1
-    a1 = b1 + d12 * dh0 + d22 * dh1 - slopes[D12] * o0 - slopes[D22] * o1
-    for k in range(CRIMPED - 3 if by_coupling.shape[0] == CRIMPED else 0):
-        a0 += slopes[CRIMP + k] * by_coupling[3 + k, j]
-        a1 += slopes[CRIMP + 3 + k] * by_coupling[3 + k, j]
-    ds_new[0, j] = slopes[AHEAD] * a0 + slopes[AHEAD + 1] * a1
-    ds_new[1, j] = slopes[AHEAD + 2] * a0 + slopes[AHEAD + 3] * a1
-    ds_new[0, j] += slopes[BEHIND] * b0 + slopes[BEHIND + 1] * b1
-    ds_new[1, j] += slopes[BEHIND + 2] * b0 + slopes[BEHIND + 3] * b1
+    # Numbers instead of entries of `slopes`, which the compiler would read anew after each write.
+    before1, before2 = slopes[BEFORE1], slopes[BEFORE2]
+    ratio1, ratio2 = slopes[RATIO1], slopes[RATIO2]
+    d11_e1, d11_e2, d11_nu = slopes[D11_E1], slopes[D11_E2], slopes[D11_NU]
+    d22_e1, d22_e2, d22_nu = slopes[D22_E1], slopes[D22_E2], slopes[D22_NU]
+    stiffness = PlaneStiffness(slopes[D11], slopes[D12], slopes[D22])
+    dh0, dh1 = slopes[TAKEN1], slopes[TAKEN2]
+    ahead00, ahead01, ahead10, ahead11 = (
+        slopes[AHEAD],
+        slopes[AHEAD + 1],
+        slopes[AHEAD + 2],
+        slopes[AHEAD + 3],
+    )
+    behind00, behind01, behind10, behind11 = (
+        slopes[BEHIND],
+        slopes[BEHIND + 1],
+        slopes[BEHIND + 2],
+        slopes[BEHIND + 3],
+    )
+    for j in range(ds_new.shape[1]):
+        o0 = old[0, j]
+        o1 = old[1, j]
+        by_nu = by_coupling[0, j]
+        warp = of_moduli[0, j] + o0 * before1 + by_coupling[1, j] * ratio1
+        fill = of_moduli[1, j] + o1 * before2 + by_coupling[2, j] * ratio2
+        d11 = d11_e1 * warp + d11_e2 * fill + by_nu * d11_nu
+        d22 = d22_e1 * warp + d22_e2 * fill + by_nu * d22_nu
+        d12 = nu * d22 + by_nu * stiffness.d22
+        b0 = ds_old[0, j]
+        b1 = ds_old[1, j]
+        a0 = b0 + d11 * dh0 + d12 * dh1 - stiffness.d11 * o0 - stiffness.d12 * o1
+        a1 = b1 + d12 * dh0 + d22 * dh1 - stiffness.d12 * o0 - stiffness.d22 * o1
+        for k in range(CRIMPED - 3 if by_coupling.shape[0] == CRIMPED else 0):
+            a0 += slopes[CRIMP + k] * by_coupling[3 + k, j]
+            a1 += slopes[CRIMP + 3 + k] * by_coupling[3 + k, j]
+        ds_new[0, j] = ahead00 * a0 + ahead01 * a1 + behind00 * b0 + behind01 * b1
+        ds_new[1, j] = ahead10 * a0 + ahead11 * a1 + behind10 * b0 + behind11 * b1
 
 
 @compiled(internal=True)

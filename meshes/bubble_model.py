@@ -272,13 +272,18 @@ class BubbleModel:
         """
         surface = np.zeros_like(self.mesh.points)
         sheet = np.zeros_like(self.mesh.points)
-        yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
-        if name in self.modes:
+        yarn = np.zeros(3)
+        if name == TURN:
+            yarn = np.cross([0.0, 0.0, 1.0], self.yarn)
+        elif name in self.modes:
             surface[:, 2] = sheet[:, 2] = self.modes[name]
         elif name in SLACK:
             axis = SLACK.index(name)
             sheet[:, axis] = self.mesh.points[:, axis]
-        return surface, sheet, yarn, self.strain_tensor(self.strains.get(name, 0.0 * sheet))
+        stretch = np.zeros((len(self.mesh.quads), 4, 2, 2))
+        if name in self.strains:
+            stretch = self.strain_tensor(self.strains[name])
+        return surface, sheet, yarn, stretch
 
     def prescribed(self, pressure: float) -> Array:
         """Return the prescribed displacements (fixed,) mm of the unknowns `fixed`.

@@ -6,7 +6,7 @@ the pressure falls. There the rise of a node is prescribed, and the pressure is 
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,6 +53,22 @@ def prepare(
         free,
         tangent_for(quads, points, free),
         tolerance,
+        step_limit=0.1 * float(np.ptp(points, axis=0).max()),
+        cords=cords_on_sheet(model),
+    )
+
+
+def with_sheet(membrane: Membrane, model: BubbleModel) -> Membrane:
+    """Return the membrane of a model that differs from its own in the sheet, not in the quads.
+
+    The storage of its tangent, which has a quarter of the work of `prepare`, is used further.
+    """
+    points, quads = arrays_of(model.mesh)
+    return replace(
+        membrane,
+        reference=points,
+        elements=reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
+        thickness=model.thickness,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
         cords=cords_on_sheet(model),
     )

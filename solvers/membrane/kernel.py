@@ -24,8 +24,14 @@ from numpy.typing import NDArray
 from ...compilation import compiled
 from ...errors import InputError
 from ...materials.memory import BY_X, ON, RECALLED, remember
-from ...materials.pieces import CauchyGreen, PointState, modulus_slopes, point_response
-from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rate
+from ...materials.pieces import (
+    CauchyGreen,
+    PointResponse,
+    PointState,
+    modulus_slopes,
+    point_response,
+)
+from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rates
 from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress, wrinkle_work
 
 # mypy does not see through numba; the shapes are in the docstrings.
@@ -638,8 +644,82 @@ def _add_product(matrix, rates, total):  # type: ignore[no-untyped-def]
             total[i, j] += by0 * rates[0, j] + by1 * rates[1, j] + by2 * rates[2, j]
 
 
-@compiled()
-def explicit_residual_slopes(  # type: ignore[no-untyped-def]
+@compiled(internal=True)
+def _add_node_forces(a, d, f, force_rate, local):  # type: ignore[no-untyped-def]
+    """Add B' times the rates of the stress resultants (3, p) to those of a node's forces (3, p).
+
+    Parameters
+    ----------
+    a, d : float, 1/mm
+        Derivatives of the shape function of the node along warp and fill.
+    f : (2, 3) array
+        Base vectors.
+    """
+    f00, f01, f02 = f[0, 0], f[0, 1], f[0, 2]
+    f10, f11, f12 = f[1, 0], f[1, 1], f[1, 2]
+    for j in range(force_rate.shape[1]):
+        along = a * force_rate[0, j] + d * force_rate[2, j]
+        across = d * force_rate[1, j] + a * force_rate[2, j]
+        local[0, j] += along * f00 + across * f10
+        local[1, j] += along * f01 + across * f11
+        local[2, j] += along * f02 + across * f12
+
+
+@compiled(internal=True)
+def _add_green_rates(a, d, record, du, green):  # type: ignore[no-untyped-def]
+    """Add B times the rates of a node's displacement (3, p) to those of the Green strain (3, p).
+
+    Parameters
+    ----------
+    a, d : float, 1/mm
+        As in `_add_node_forces`.
+    record : (POINT or more,) array
+        Begins with the base vectors.
+    """
+    f00, f01, f02 = record[0], record[1], record[2]
+    f10, f11, f12 = record[3], record[4], record[5]
+    for j in range(du.shape[1]):
+        along = f00 * du[0, j] + f01 * du[1, j] + f02 * du[2, j]
+        across = f10 * du[0, j] + f11 * du[1, j] + f12 * du[2, j]
+        green[0, j] += a * along
+        green[1, j] += d * across
+        green[2, j] += a * across + d * along
+
+
+class SlopeWork(NamedTuple):
+    """Work arrays of `explicit_residual_slopes` for an element.
+
+    Attributes
+    ----------
+    after : PointState
+        At the end of the increment.
+    response : PointResponse
+    weights : (P, 4) array
+        See `modulus_slopes`.
+    x : (4, 3) array, mm
+        Positions of the nodes.
+    f : (2, 3) array
+        Base vectors.
+    of_moduli : (3, p) array, MPa
+        Explicit derivatives of (E1, E2, G12) by each parameter.
+    force_rate : (3, p) array, N mm
+        Change of the 2nd Piola-Kirchhoff stress times volume.
+    local : (12, p) array, N
+        Derivatives of the nodal forces.
+    """
+
+    after: PointState
+    response: PointResponse
+    weights: Array
+    x: Array
+    f: Array
+    of_moduli: Array
+    force_rate: Array
+    local: Array
+
+
+@compiled(internal=True)
+def _add_residual_slopes(  # type: ignore[no-untyped-def]
     position,
     elements,
     law,
@@ -649,45 +729,18 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
     pressure_column,
     point,
     rate,
+    work,
 ):
-    """Write the derivatives of the residual by p parameters at fixed displacement.
-
-    The parameters are those of the law, the pressure and the thickness.
-
-    Parameters
-    ----------
-    position : (n, 3) array, mm
-    elements : Elements
-    law : CompiledLaw
-    before : State
-        At the start of the increment.
-    of_law : LawSlopes
-        Derivatives of the law by the parameters.
-    of_state : StateSlopes
-        Derivatives of the state by the parameters; its `fixed_stress` is written.
-    pressure_column : int
-        Index of the parameter that is added to the pressure, or -1.
-    point : (m, 4, POINT or more) array
-        What `advance` needs; written.
-    rate : (3 n, p) array
-        The derivatives; written.
-    """
+    """Write the derivatives of `explicit_residual_slopes` with its work arrays, a SlopeWork."""
     quads, values, all_slopes, area, thickness = elements
     nu = law.coupling[0]
     by_coupling = of_law.coupling
     count = of_law.coupling.shape[1]
     rate[:] = 0.0
-    after = PointState(np.empty(before.strain.shape[2]), np.empty(3))
+    after, response, weights, x, f, of_moduli, force_rate, local = work
     h = after.strain
-    response = point_response()
     law_slopes = response.law.slopes
     pull = response.pull
-    weights = np.empty((law.pieces.shape[1], 4))
-    x = np.empty((4, 3))
-    f = np.empty((2, 3))
-    of_moduli = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
-    force_rate = np.empty((3, count))
-    local = np.empty((12, count))
     for e in range(quads.shape[0]):
         node_positions(position, quads, e, x)
         local[:] = 0.0
@@ -725,36 +778,118 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
                     pull[i, k] *= volume
             ds_old = of_state.stress[e, g]
             ds_new = of_state.fixed_stress[e, g]
+            stress_rates(law_slopes, nu, of_moduli, by_coupling, dh_old, ds_old, ds_new)
+            before3 = law_slopes[BEFORE3]
+            g12 = law_slopes[G12]
             for j in range(count):
-                stress_rate(
-                    law_slopes,
-                    nu,
-                    of_moduli,
-                    by_coupling,
-                    j,
-                    dh_old,
-                    ds_old,
-                    ds_new,
-                )
-                shear = of_moduli[2, j] + dh_old[2, j] * law_slopes[BEFORE3]
-                ds_new[2, j] = ds_old[2, j] + shear * dh2 - law_slopes[G12] * dh_old[2, j]
+                shear = of_moduli[2, j] + dh_old[2, j] * before3
+                ds_new[2, j] = ds_old[2, j] + shear * dh2 - g12 * dh_old[2, j]
             # The change of stress at fixed strain, times `pull` (2nd Piola-Kirchhoff stress by
             # Cauchy stress) and volume; B' of it is the change of the nodal forces.
             force_rate[:] = 0.0
             _add_product(pull, ds_new, force_rate)
             for n in range(4):
-                for k in range(3):
-                    b0 = slopes[0, n] * f[0, k]
-                    b1 = slopes[1, n] * f[1, k]
-                    b2 = slopes[0, n] * f[1, k] + slopes[1, n] * f[0, k]
-                    for j in range(count):
-                        local[3 * n + k, j] += (
-                            b0 * force_rate[0, j] + b1 * force_rate[1, j] + b2 * force_rate[2, j]
-                        )
+                _add_node_forces(
+                    slopes[0, n], slopes[1, n], f, force_rate, local[3 * n : 3 * n + 3]
+                )
             if pressure_column >= 0:
                 _add_pressure_slope(f, values[g], area[e, g], local, pressure_column)
             _keep_point(f, response, point[e, g])
         add_to_nodes(rate, quads, e, local)
+
+
+@compiled()
+def explicit_residual_slopes(  # type: ignore[no-untyped-def]
+    position,
+    elements,
+    law,
+    before,
+    of_law,
+    of_state,
+    pressure_column,
+    point,
+    rate,
+):
+    """Write the derivatives of the residual by p parameters at fixed displacement.
+
+    The parameters are those of the law, the pressure and the thickness.
+
+    Parameters
+    ----------
+    position : (n, 3) array, mm
+    elements : Elements
+    law : CompiledLaw
+    before : State
+        At the start of the increment.
+    of_law : LawSlopes
+        Derivatives of the law by the parameters.
+    of_state : StateSlopes
+        Derivatives of the state by the parameters; its `fixed_stress` is written.
+    pressure_column : int
+        Index of the parameter that is added to the pressure, or -1.
+    point : (m, 4, POINT or more) array
+        What `advance` needs; written.
+    rate : (3 n, p) array
+        The derivatives; written.
+    """
+    count = of_law.coupling.shape[1]
+    work = SlopeWork(
+        PointState(np.empty(before.strain.shape[2]), np.empty(3)),
+        point_response(),
+        np.empty((law.pieces.shape[1], 4)),
+        np.empty((4, 3)),
+        np.empty((2, 3)),
+        np.empty((3, count)),
+        np.empty((3, count)),
+        np.empty((12, count)),
+    )
+    _add_residual_slopes(
+        position,
+        elements,
+        law,
+        before,
+        of_law,
+        of_state,
+        pressure_column,
+        point,
+        rate,
+        work,
+    )
+
+
+@compiled(internal=True)
+def _advance(  # type: ignore[no-untyped-def]
+    quads,
+    slopes,
+    point,
+    du,
+    of_sheet,
+    columns,
+    dh,
+    ds,
+    green,
+):
+    """Update as `advance`; `green` (3, p) is written with derivatives of the Green strain."""
+    count = du.shape[1]
+    for e in range(quads.shape[0]):
+        for g in range(4):
+            record = point[e, g]
+            dn = slopes[e, g]
+            green[:] = 0.0
+            for n in range(4):
+                node = 3 * quads[e, n]
+                _add_green_rates(dn[0, n], dn[1, n], record, du[node : node + 3], green)
+            for k in range(len(columns)):
+                for i in range(3):
+                    green[i, columns[k]] += of_sheet[e, g, i, k]
+            strain = dh[e, g]
+            stress = ds[e, g]
+            strain[:3] = 0.0
+            _add_product(record[6:15].reshape(3, 3), green, strain)
+            _add_product(record[15:24].reshape(3, 3), strain, stress)
+            for i in range(3, strain.shape[0]):
+                for j in range(count):
+                    strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
 
 
 @compiled()
@@ -763,6 +898,8 @@ def advance(  # type: ignore[no-untyped-def]
     slopes,
     point,
     du,
+    of_sheet,
+    columns,
     dh,
     ds,
 ):
@@ -777,36 +914,17 @@ def advance(  # type: ignore[no-untyped-def]
         As `explicit_residual_slopes` wrote it.
     du : (3 n, p) array
         Derivatives of the displacement.
+    of_sheet : (m, 4, 3, k) array
+        Derivatives of the Green-Lagrange strain by parameters of the sheet at fixed displacement.
+    columns : (k,) array of int
+        Indices of these among the parameters.
     dh : (m, 4, law.state, p) array
         Derivatives of the strain, of which those of the log strain are overwritten.
     ds : (m, 4, 3, p) array
         Derivatives of the stress at fixed displacement; the part of du is added.
     """
-    count = du.shape[1]
-    green = np.empty((3, count))  # derivatives of the Green-Lagrange strain
-    for e in range(quads.shape[0]):
-        for g in range(4):
-            record = point[e, g]
-            dn = slopes[e, g]
-            green[:] = 0.0
-            for n in range(4):
-                for k in range(3):
-                    b0 = dn[0, n] * record[k]
-                    b1 = dn[1, n] * record[3 + k]
-                    b2 = dn[0, n] * record[3 + k] + dn[1, n] * record[k]
-                    row = du[3 * quads[e, n] + k]
-                    for j in range(count):
-                        green[0, j] += b0 * row[j]
-                        green[1, j] += b1 * row[j]
-                        green[2, j] += b2 * row[j]
-            strain = dh[e, g]
-            stress = ds[e, g]
-            strain[:3] = 0.0
-            _add_product(record[6:15].reshape(3, 3), green, strain)
-            _add_product(record[15:24].reshape(3, 3), strain, stress)
-            for i in range(3, strain.shape[0]):
-                for j in range(count):
-                    strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
+    green = np.empty((3, du.shape[1]))
+    _advance(quads, slopes, point, du, of_sheet, columns, dh, ds, green)
 
 
 class BaseSlopes(NamedTuple):

@@ -66,9 +66,10 @@ class Derivatives:
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
         self.point = np.empty((len(membrane.quads), 4, POINT + remembered))
         self.residual_slopes = np.empty((membrane.reference.size, len(names)))
-        self.columns: list[int] = []
+        sheet = sheet or {}
+        self.columns = np.array([names.index(name) for name in sheet], dtype=np.intp)
+        self.green = np.empty((*shape[:3], len(sheet)))
         if sheet and at is not None:
-            self.columns = [names.index(name) for name in sheet]
             surface, ways, turns, by = (
                 np.stack(columns) for columns in zip(*sheet.values(), strict=True)
             )
@@ -85,7 +86,6 @@ class Derivatives:
                 stretch,
                 by,
             )
-            self.green = np.empty((*shape[:3], len(sheet)))
             self.sheet_residual_slopes = np.empty((membrane.reference.size, len(sheet)))
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
@@ -112,7 +112,7 @@ class Derivatives:
             self.point,
             self.residual_slopes,  # written
         )
-        if self.columns:
+        if len(self.columns):
             sheet = SheetSlopes(self.surface, self.slopes, self.area)
             by_sheet(
                 position,
@@ -148,20 +148,11 @@ class Derivatives:
             m.elements.slopes,
             self.point,
             du,
+            self.green,
+            self.columns,
             self.strain,
             self.stress,
         )
-        if self.columns:
-            to_strain, to_stress = (
-                self.point[..., first : first + 9].reshape(*self.point.shape[:2], 3, 3)
-                for first in (6, 15)
-            )
-            strain = to_strain @ self.green
-            self.strain[..., :3, self.columns] += strain
-            for first in range(3, self.strain.shape[2], 3):
-                factor = self.point[..., POINT + first - 3 : POINT + first, None]
-                self.strain[..., first : first + 3, self.columns] += factor * strain
-            self.stress[..., self.columns] += to_stress @ strain
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the derivatives (3 n, p) of the displacement, and update strain and stress.

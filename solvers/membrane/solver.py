@@ -22,6 +22,7 @@ from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_
 from ..decks import in_words
 from ..pretension import slack_slopes, stretched
 from . import beam, bubble, closed, cylinder, homogeneous_tube, inflation, patch, strip
+from .factorisation import BandedTangent
 from .loading import RunRequest
 from .membrane import Membrane
 from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
@@ -218,13 +219,29 @@ class MembraneSolver:
             history = replace(history, path_slope=by_parameters(history.path_slope))
         return history, by_parameters(slopes)
 
+    def _new_membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch | beam.Beam:
+        """Return the membrane of a model, made from that of the last run if only the sheet differs.
+
+        Sparse tangents are made anew, as the order of their unknowns depends on the sheet.
+        """
+        if self._prepared is not None and isinstance(model, BubbleModel):
+            previous, membrane = self._prepared
+            if isinstance(previous, BubbleModel) and isinstance(membrane, Membrane):
+                is_same_disk = (
+                    model.mesh.quads is previous.mesh.quads and model.supports is previous.supports
+                )
+                is_banded = isinstance(membrane.tangent, BandedTangent)
+                if is_same_disk and is_banded and membrane.law.state == law.state:
+                    return bubble.with_sheet(membrane, model)
+        prepare = analysis_of(ANALYSES, model, self.name).prepare
+        return prepare(model, law, self.tolerance, self.wall)
+
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch | beam.Beam:
         """Return the membrane of a model, unloaded; the last one again for the same model."""
         prepared = self._prepared
         state = law.state if prepared is None else getattr(prepared[1], "law", law).state
         if prepared is None or prepared[0] is not model or state != law.state:
-            prepare = analysis_of(ANALYSES, model, self.name).prepare
-            self._prepared = (model, prepare(model, law, self.tolerance, self.wall))
+            self._prepared = (model, self._new_membrane(model, law))
         assert self._prepared is not None
         membrane = self._prepared[1]
         if isinstance(membrane, beam.Beam):

@@ -5,7 +5,7 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
 from bubblefit.solvers.base import analysis_of
 from bubblefit.solvers.membrane.kernel import reference_elements
@@ -54,6 +54,25 @@ def test_guesses_and_earlier_runs_do_not_change_a_strip():
     raised(SolverFailure, "", solver.run, strip, HypoelasticLaw.linear(300.0, -200.0, 5.0))
     assert (solver.run(strip, LAW).load == first.load).all()
     assert (solver.run(bubble, LAW).path == inflated.path).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "amount"), [("z0_1", 2.0), ("slack_warp", 0.01), ("thickness", 0.1)]
+)
+def test_run_of_another_sheet_does_not_change_a_bubble(name, amount):
+    """The storage of its tangent is used again, and nothing else of the run before."""
+    mesh = disk_mesh(100.0, 48, "full")
+    model = BubbleModel(mesh, 0.81, (0.02, 0.1), modes=disk_modes(mesh.points / 100.0, 6))
+    other = model.with_parameters({name: amount})
+    solver = MembraneSolver()
+    solver.run(model, LAW)
+    tangent = solver._prepared[1].tangent
+    again, fresh = (s.run_with_sensitivity(other, LAW, ["beta_3", name])
+                    for s in (solver, MembraneSolver()))  # fmt: skip
+    assert solver._prepared[1].tangent is tangent
+    for run, expected in zip(again, fresh, strict=True):
+        of_run, of_fresh = (getattr(side, "path", side) for side in (run, expected))
+        np.testing.assert_array_equal(of_run, of_fresh)
 
 
 HOPELESS_LAWS = {
