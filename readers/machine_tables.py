@@ -209,6 +209,7 @@ class MachineTable:
         units: Mapping[str, float],
         channel: Channel = AS_FOUND,
         key: str = "",
+        holes: bool = False,
     ) -> Array:
         """Return the numbers of a column in the base unit.
 
@@ -221,6 +222,8 @@ class MachineTable:
             What the caller says of the column.
         key : str
             Argument of the caller, for messages, that gives the unit of the channel.
+        holes : bool
+            Whether cells may stand for no value; they give NaN.
 
         Returns
         -------
@@ -243,7 +246,7 @@ class MachineTable:
                 unit = match[1]
             if not unit and not channel.unit:
                 channel = replace(channel, unit="s")
-        readings = self.table.numbers(column)
+        readings = self.table.numbers(column, holes)
         location = f"line {self.header}, column {column!r}"
         return in_unit(
             readings,
@@ -397,7 +400,7 @@ def in_unit(
     factor = 1.0 if channel.scale is None else channel.scale
     with np.errstate(over="ignore"):
         values = np.asarray((factor * readings + channel.offset) * scale)
-    if not np.isfinite(values).all():
+    if np.isinf(values).any():
         raise InputError(path, location, f"numbers too large; is the unit {unit!r} right?")
     return values
 

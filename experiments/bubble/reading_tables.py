@@ -146,7 +146,7 @@ def _height_at_rest(tables: Sequence[pd.DataFrame], quantity: str) -> float | No
         before = pressure[: np.argmax(pressure)]
         is_at_rest = before <= LIMITS.least_pressure * pressure.max()
         first_loaded = len(before) if is_at_rest.all() else int(np.argmin(is_at_rest))
-        heights += table[quantity].iloc[:first_loaded].tolist()
+        heights += table[quantity].iloc[:first_loaded].dropna().tolist()
     return float(np.mean(heights)) if heights else None
 
 
@@ -395,9 +395,15 @@ def _read_table(
             headings[name] = table.column(name)
     contents: dict[str, Any] = {}
     stated: dict[str, str | None] = {}
+    notes = [*table.notes]
     for name, column in headings.items():
         contents[name], stated[name] = _contents(table, section, name, column)
-    source = table.source(headings, stated, table.notes)
+        hole_count = int(pd.isna(contents[name]).sum())
+        if hole_count == len(contents[name]):
+            raise table.error(column, "holds no number")
+        if hole_count:
+            notes.append(f"{hole_count} of {len(contents[name])} readings of {column!r} missing")
+    source = table.source(headings, stated, notes)
     return pd.DataFrame(contents), DataFile(path, source, None)
 
 
@@ -413,7 +419,9 @@ def _contents(
     if isinstance(section, ApexSection) and units is CURVATURE_UNITS:
         _check_unit_of_curvature(table, column, section)
     unit = getattr(section, unit_key, None)
-    return table.values(column, units, Channel(unit=unit), unit_key), unit
+    # One instrument may have missed a reading that the others have.
+    holes = name not in ("pressure", "coordinate")
+    return table.values(column, units, Channel(unit=unit), unit_key, holes), unit
 
 
 def _check_unit_of_curvature(table: MachineTable, column: str, section: ApexSection) -> None:
@@ -517,14 +525,14 @@ def _series(
     column: str,
     positions: Array,
 ) -> ReadingSeries:
-    """Return the series of a column of a table of readings.
+    """Return the series of a column of a table of readings, without rows that lack one.
 
     Parameters
     ----------
     positions : (n, 2) array, mm
         Where the readings were taken.
     """
-    return ReadingSeries(
+    series = ReadingSeries(
         quantity,
         label,
         table["pressure"].to_numpy(float),
@@ -532,3 +540,4 @@ def _series(
         positions,
         table["specimen"].to_numpy(np.intp),
     )
+    return series.subset(np.isfinite(series.value))

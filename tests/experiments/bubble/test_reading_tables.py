@@ -442,3 +442,20 @@ def test_columns_of_gauges_may_be_named_without_their_units(tmp_path):
 def test_columns_of_gauges_that_are_not_one_each_are_refused(tmp_path, names, words):
     (tmp_path / "h.csv").write_text("p (kPa);h1 (mm);h2 (mm);h2 (cm)\n10;9;7;7\n20;12;9;9\n")
     assert words in refusal(tmp_path, GAUGES + f"columns = {{ height = {names} }}\n")
+
+
+def test_reading_that_one_gauge_lacks_is_left_out_alone(tmp_path):
+    rows = [f"{p},{h},{0.75 * h}" for p, h in zip(KILO, RISE, strict=True)]
+    for hole in ("", "n/a", "-", "#N/A", "#NV"):
+        text = "\n".join([*rows[:2], f"{KILO[2]},{RISE[2]},{hole}", *rows[3:]])
+        (tmp_path / "h.csv").write_text(f"p (kPa),apex (mm),warp 50 (mm)\n{text}\n")
+        keys = 'files = ["h.csv"]\nplaces = [[0, 0], [50, 0]]\n'
+        data = bubble_of(tmp_path, HEIGHTS + keys).data
+        apex, half = data.series
+        np.testing.assert_allclose(apex.value, RISE)
+        np.testing.assert_allclose(half.value, 0.75 * np.delete(RISE, 2))
+        assert "1 of 4 readings of 'warp 50 (mm)' missing" in data.files[0].source.notes
+    (tmp_path / "h.csv").write_text(f"p (kPa),apex (mm),warp 50 (mm)\n{text}\n,11.0,9.0\n")
+    assert "column 'p (kPa)': expected a number" in refusal(tmp_path, HEIGHTS + keys)
+    (tmp_path / "h.csv").write_text("p (kPa),apex (mm),warp 50 (mm)\n10,9.6,\n40,15.3,n/a\n")
+    assert "column 'warp 50 (mm)': holds no number" in refusal(tmp_path, HEIGHTS + keys)
