@@ -258,6 +258,44 @@ def pressure_unit(view: MeasuredView) -> Iterator[Doubt]:
         doubt = Doubt("pressure-unit", True, f"the highest pressure: {problem}")
     if doubt is not None:
         yield doubt
+    else:
+        yield from absolute_pressure(np.array([f.pressure for f in view.fields]), view.rises)
+
+
+@dataclass(frozen=True)
+class AbsolutePressure:
+    """What shows that pressures count from vacuum, not from the air around; in MPa."""
+
+    air: tuple[float, float] = (0.085, 0.108)  # on high mountains, and in the deepest low
+    first: float = 1.3  # the lowest pressure over the air's: the sheet has hardly risen there
+    first_height: float = 0.5  # height there over the largest
+    min_frames: int = 5
+
+
+ABSOLUTE = AbsolutePressure()
+
+
+def absolute_pressure(pressure: Array, height: Array) -> Iterator[Doubt]:
+    """Doubt pressures that are about the air's where the sheet would not have risen.
+
+    Parameters
+    ----------
+    pressure : (n,) array, MPa
+    height : (n,) array, mm
+        Of the centre, by rising pressure.
+    """
+    if len(height) < ABSOLUTE.min_frames or not 0 < height[0] < ABSOLUTE.first_height * height[-1]:
+        return
+    share = height / height[-1]
+    # A flat sheet rises by p = a h + b h^3.
+    at_rest = np.linalg.lstsq(share[:, None] ** [0, 1, 3], pressure)[0][0]
+    low, high = ABSOLUTE.air
+    if low < at_rest < high and at_rest / ABSOLUTE.first < pressure[0] < ABSOLUTE.first * at_rest:
+        text = (
+            f"the heights vanish at a pressure of {1e3 * at_rest:.3g} kPa, about the air's: is it "
+            "absolute? Say by how much it exceeds the pressure of the air"
+        )
+        yield Doubt("pressure-unit", True, text)
 
 
 def _modulus_doubt(view: MeasuredView, modulus: float) -> Doubt | None:

@@ -21,6 +21,7 @@ from ..cap import CapEstimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from . import BubbleTest, prepared
+from .doubts import absolute_pressure
 from .nuisance import reading_nuisance
 from .prepared import OBJECTIVES, PreparedInflation
 from .reading_objective import ReadingObjective, reader_of
@@ -139,6 +140,7 @@ class PreparedReadings(PreparedInflation):
         doubts = _doubts_of_readings(self.test, self.readings)
         central = self._central_heights()
         if central is not None and not any(doubt.sure for doubt in doubts):
+            doubts += absolute_pressure(*central)
             doubts += _doubts_of_modulus(self.test, *central, expected)
         return doubts
 

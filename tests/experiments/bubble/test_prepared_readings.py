@@ -132,6 +132,15 @@ def test_readings_of_a_release_that_are_left_out_are_counted(heights, order, lef
     assert not prepared_of(bubble).doubts(UNKNOWN)
 
 
+@pytest.mark.parametrize(("air", "is_doubted"), [(0.0, False), (0.1013, True), (0.3, False)])
+def test_absolute_pressures_are_doubted(heights, air, is_doubted):
+    keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
+    bubble = bf.Bubble.heights(np.array(PRESSURES) + air, heights[:1], **keys)
+    doubts = prepared_of(bubble).doubts(UNKNOWN)
+    assert [doubt.name for doubt in doubts] == ["pressure-unit"] * is_doubted
+    assert not is_doubted or "about the air's: is it absolute" in doubts[0].text
+
+
 @pytest.mark.parametrize(
     ("radius", "places", "changes", "names"),
     [
