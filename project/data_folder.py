@@ -212,9 +212,17 @@ class GaugedBubble:
             return self.keys.setdefault("decimal", ",")
 
 
+def _machine_table(file: Path, *quantities: str) -> MachineTable:
+    """Read a table; commas that may mark thousands as well are taken for decimal ones."""
+    try:
+        return read_machine_table(file, TableOptions(quantities=quantities))
+    except InputError:
+        return read_machine_table(file, TableOptions(quantities=quantities, decimal=","))
+
+
 def read_heights(file: Path) -> GaugedBubble:
     """Recognise a table of pressure and height at one place or several; raise InputError."""
-    table = read_machine_table(file, TableOptions(quantities=("pressure",)))
+    table = _machine_table(file, "pressure")
     pressure = table.column("pressure")
     heights = _columns_of_heights(table, pressure)
     if not heights:
@@ -262,7 +270,7 @@ def _place_in(name: str) -> list[float] | None:
 
 def read_profiles(file: Path) -> GaugedBubble:
     """Recognise heights along lines, at one pressure or several; raise InputError."""
-    table = read_machine_table(file, TableOptions(quantities=("coordinate", "height")))
+    table = _machine_table(file, "coordinate", "height")
     coordinate, height = table.column("coordinate"), table.column("height")
     pressures = columns_of(table.names, "pressure", {})
     is_numbered = bool(re.search(r"\d", split_unit(coordinate)[0]))  # a gauge, at x 50
@@ -277,7 +285,7 @@ def read_profiles(file: Path) -> GaugedBubble:
 
 def read_apex(file: Path) -> GaugedBubble:
     """Recognise curvature or strain of the apex by pressure; raise InputError."""
-    table = read_machine_table(file, TableOptions(quantities=("pressure",)))
+    table = _machine_table(file, "pressure")
     columns: dict[str, str] = {}
     for name in table.names:
         words = [word.casefold() for word in WORD.findall(split_unit(name)[0])]

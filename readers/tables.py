@@ -429,13 +429,20 @@ def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
         # Marks of thousands say nothing of the decimal mark, but that it is the other.
         thousands = _columns_of_thousands(cells)
         cells = [cell for cell in cells if cell[1] not in thousands]
-        if _has_points(cells):
+        if _has_points(cells) and not _has_grouping_points_only(cells):
             return "."
     commas = [cell for cell in cells if _COMMA.fullmatch(cell[2])]
     if not commas:
         return "."
     _check_ambiguous(path, commas)
     return ","
+
+
+def _has_grouping_points_only(cells: Sequence[tuple[int, str, str]]) -> bool:
+    """Return whether points stand before three digits only, beside commas that are decimal."""
+    texts = [cell for _, _, cell in cells if is_number(cell)]
+    has_decimals = any(_COMMA.fullmatch(cell) and not is_ambiguous(cell) for cell in texts)
+    return has_decimals and all(is_ambiguous(cell) for cell in texts if "." in cell)
 
 
 def _check_ambiguous(path: Path, commas: Sequence[tuple[int, str, str]]) -> None:

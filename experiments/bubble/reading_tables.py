@@ -398,13 +398,17 @@ def _read_table(
     notes = [*table.notes]
     for name, column in headings.items():
         contents[name], stated[name] = _contents(table, section, name, column)
-        hole_count = int(pd.isna(contents[name]).sum())
-        if hole_count == len(contents[name]):
-            raise table.error(column, "holds no number")
-        if hole_count:
-            notes.append(f"{hole_count} of {len(contents[name])} readings of {column!r} missing")
+        notes += _notes_of_holes(table, column, contents[name])
     source = table.source(headings, stated, notes)
     return pd.DataFrame(contents), DataFile(path, source, None)
+
+
+def _notes_of_holes(table: MachineTable, column: str, contents: Any) -> list[str]:
+    """Return a note on missing readings of a column, if any; InputError if all are missing."""
+    missing = int(pd.isna(contents).sum())
+    if missing == len(contents):
+        raise table.error(column, "holds no number")
+    return [f"{missing} of {len(contents)} readings of {column!r} missing"] * (missing > 0)
 
 
 def _contents(

@@ -247,6 +247,12 @@ def test_commas_before_three_digits_are_taken_for_decimal_ones(tmp_path):
     path.write_text("Druck [kPa];Scheitel [mm];Kette 50 [mm]\n20;11;8,381\n40;14;10,617\n")
     gauges = read_heights(path)
     assert gauges.keys["decimal"] == "," and "thousands" in gauges.remarks["decimal"]
+    path.write_text("Druck [kPa];Scheitel [mm];Kette 50 [mm]\n20,000;11,2;8,381\n")
+    assert "decimal" not in read_heights(path).keys
+    path.write_text("Druck [kPa];Scheitel [mm];Kette 50 [mm]\n20,000;11,102;8,381\n")
+    assert read_heights(path).keys["decimal"] == ","
+    path.write_text("x [mm];z [mm];Druck [kPa]\n10,500;9,250;20,000\n-5,500;9,750;20,000\n")
+    assert read_profiles(path).keys["decimal"] == ","
     heading = "Druck [kPa];Radius Kette [mm];Dehnung Kette [%]"
     path.write_text(f"{heading}\n20;491,5;0,77\n40;391,2;1,2\n")
     apex = read_apex(path)
