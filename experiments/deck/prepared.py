@@ -134,6 +134,8 @@ class PreparedDeck(PreparedParts):
                 f"{values.max():.4g} {compared.unit} {start_words}, measured "
                 f"{compared.load.min():.4g} to {compared.load.max():.4g}"
             )
+            if values @ compared.load < 0:
+                lines[-1] += ", of the opposite sign: reverse the model's by scale = -1"
             if effects:
                 unit = f"{compared.unit}, a tenth of the bounds"
                 lines[-1] += f"; moved by up to ({unit}): {', '.join(effects)}"

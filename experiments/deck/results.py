@@ -338,7 +338,7 @@ class QuantityReading:
         rise = np.sign(x[-1] - x[0])
         if not rise or (np.diff(rise * x) < 0).any():
             raise SolverFailure(f"{self.x.quantity} {self.x.place} does not grow steadily")
-        _check_span(x, self.at)
+        _check_span(x, self.at, f"{self.x.quantity} {self.x.place}")
         positions = np.clip(rise * self.at, *sorted(rise * x[[0, -1]]))
         return _smooth(rise * x, y)(positions), rounding
 
@@ -384,7 +384,7 @@ class FieldReading:
         """
         nodes = results.nodes(self.place)
         field, rounding = results.field("displacement", nodes)
-        _check_span(results.times, np.array([time for time, _, _ in self.frames]))
+        _check_span(results.times, np.array([time for time, _, _ in self.frames]), "time")
         nodal = {
             axis: _smooth(results.times, _along(axis, field, "displacement"))
             for axis in {axis for _, axis, _ in self.frames}
@@ -423,14 +423,15 @@ def _along(axis: int, field: Array, quantity: str) -> Array:
     return field[:, :, axis]
 
 
-def _check_span(results: Array, measured: Array) -> None:
+def _check_span(results: Array, measured: Array, quantity: str) -> None:
     """Raise SolverFailure where measured values (n,) lie beyond those (frames,) of the results."""
     room = BEYOND_END * np.ptp(results)
     low = measured.min()
     high = measured.max()
     if high > results.max() + room or low < results.min() - room:
         span = f"{results[0]:.6g} to {results[-1]:.6g}"
-        raise SolverFailure(f"the results go from {span}, measured: {low:.6g} to {high:.6g}")
+        problem = f"the results go from {span}, measured: {low:.6g} to {high:.6g} ({quantity})"
+        raise SolverFailure(f"{problem}; is the unit right, and does the analysis go as far?")
 
 
 @dataclass(frozen=True, eq=False)

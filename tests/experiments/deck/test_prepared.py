@@ -4,6 +4,7 @@ import sys
 
 import bubblefit as bf
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.optimize
 from bubblefit.errors import SolverFailure
@@ -98,7 +99,13 @@ def test_check_says_what_moves_what(tmp_path, monkeypatch):
     first, second = setup.tests[0].seen
     assert "a Jacobian by differences takes up to 2 more, and a fit usually 14" in first
     assert "force: 12 values from 0.2469 to 1.693 N at the start, measured 0.1076" in second
-    assert second.endswith("C10 0.714, C01 0.151")
+    assert second.endswith("C10 0.714, C01 0.151") and "opposite sign" not in second
+    path = tmp_path / "frame.csv"
+    table = pd.read_csv(path)
+    table.iloc[:, 1] *= -1
+    table.to_csv(path, index=False)
+    second = fit_setup(read_project(tmp_path / "project.toml")).tests[0].seen[1]
+    assert "to -0.1076, of the opposite sign: reverse the model's by scale = -1; moved" in second
 
 
 @pytest.mark.parametrize(

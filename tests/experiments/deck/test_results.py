@@ -108,7 +108,7 @@ def test_increments_of_a_program_do_not_show_in_a_curve(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        ([(0, 0), (1, 3)], "the results go from 0 to 1, measured: 0.5 to 2"),
+        ([(0, 0), (1, 3)], "from 0 to 1, measured: 0.5 to 2 .result x.; is the unit"),
         ([(0, 0), (2, 3), (1, 4)], "result x does not grow steadily"),
         ([(0, 0), (2, "nan")], "no usable results in curve.csv: .*column 'y': expected a number"),
     ],
