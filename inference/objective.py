@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -210,6 +211,8 @@ class Blocks:
         Number of residuals of each block; m is their sum.
     least_norms : (blocks,) array, optional
         Norm of each block below which only its square counts; zero by default.
+    columns : sequence of (k,) int arrays, optional
+        The unknowns on which the residuals of each block depend; all by default.
 
     Attributes
     ----------
@@ -219,7 +222,13 @@ class Blocks:
         Index of the block that each residual belongs to.
     """
 
-    def __init__(self, sizes: Sequence[int], least_norms: Array | None = None) -> None:
+    def __init__(
+        self,
+        sizes: Sequence[int],
+        least_norms: Array | None = None,
+        columns: Sequence[NDArray[np.intp]] | None = None,
+    ) -> None:
+        self.columns = columns
         self.sizes = tuple(int(size) for size in sizes)
         self.least_norms = np.zeros(len(self.sizes)) if least_norms is None else least_norms
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)[:-1]]).astype(np.intp)
@@ -252,6 +261,40 @@ class Blocks:
         """
         norms = np.maximum(self.norms(residual), MIN_NORM)
         return (residual / norms[self.block_of]) @ jacobian
+
+    def gradients(self, residual: Array, jacobian: Array) -> Array:
+        """Return half of the slope of the squared norm of each block, (blocks, unknowns).
+
+        Parameters
+        ----------
+        residual : (m,) array
+        jacobian : (m, unknowns) array
+        """
+        return np.array([residual[rows] @ jacobian[rows] for rows in self._rows])
+
+    def gram(self, jacobian: Array, weights: Array) -> Array:
+        """Return the weighted sum of J'J over the blocks, (unknowns, unknowns).
+
+        Parameters
+        ----------
+        jacobian : (m, unknowns) array
+            J of all blocks.
+        weights : (blocks,) array
+        """
+        count = jacobian.shape[1]
+        total = np.zeros((count, count))
+        columns = self.columns or [np.arange(count)] * len(self.sizes)
+        for rows, columns_of_block, weight in zip(self._rows, columns, weights, strict=True):
+            part = jacobian[rows, columns_of_block]
+            total[np.ix_(columns_of_block, columns_of_block)] += weight * (part.T @ part)
+        return total
+
+    @cached_property
+    def _rows(self) -> list[slice]:
+        """Return where the residuals of each block lie."""
+        return [
+            slice(start, start + size) for start, size in zip(self.starts, self.sizes, strict=True)
+        ]
 
 
 DIFFERENCE = 1e-5  # step of a central difference, relative to the largest modelled value

@@ -76,9 +76,10 @@ Watch = Callable[[Array, float | None, str, str], None]
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A run of one comparison: residual (m,), and slopes (m, unknowns) if it was differentiated.
+    """A run of one comparison: residual (m,), and its slopes if it was differentiated.
 
-    With where the next run may start, and the processor time that this one took.
+    These are by the unknowns of the comparison (`Unknowns.columns_of`) only. With where the next
+    run may start, if that is new, and the processor time that this one took.
     """
 
     history: History
@@ -152,7 +153,7 @@ class _Team:
             if isinstance(run, SolverFailure):
                 has_failed = True
                 continue
-            if analysis.with_jacobian:
+            if run.warm_start is not None:
                 self.states[k] = before[k]._replace(warm_start=run.warm_start)
             if not has_failed:
                 comparison.state = self.states[k]
@@ -248,10 +249,14 @@ class FitProblem:
         sizes = [size for comparison in self.comparisons for size in comparison.objective.sizes]
         prior_count = len(self.unknowns.nuisance.priors[0])
         sizes += [prior_count] if prior_count else []
-        self.blocks = Blocks(sizes)
+        columns = [
+            self.unknowns.columns_of(c.name) for c in self.comparisons for _ in c.objective.sizes
+        ]
+        columns += [np.arange(self.unknowns.count)] if prior_count else []
+        self.blocks = Blocks(sizes, columns=columns)
         # `_least_norms` needs the blocks, first without those norms.
         if self._weighs_by_noise:
-            self.blocks = Blocks(sizes, self._least_norms)
+            self.blocks = Blocks(sizes, self._least_norms, columns)
 
     @property
     def solver(self) -> Solver:
@@ -444,13 +449,14 @@ class FitProblem:
             comparison.state = analysis.state
         y = analysis.unknowns
         law = self.unknowns.law(self.law, y)
+        previous = comparison.warm_start
         start = time.process_time()
         try:
             run = self._run(comparison, law, y, analysis.with_jacobian, analysis.warm)
         except SolverFailure as failure:
             return failure
         comparison.seconds = time.process_time() - start
-        warm_start = comparison.warm_start if analysis.with_jacobian else None
+        warm_start = None if comparison.warm_start is previous else comparison.warm_start
         return replace(run, warm_start=warm_start, seconds=comparison.seconds)
 
     def _run(
@@ -467,10 +473,8 @@ class FitProblem:
         jacobian = None
         if with_jacobian:
             history, slope = comparison.differentiate(law, unknowns.free, nuisance, warm)
-            size = unknowns.size
-            jacobian = np.zeros((len(slope), unknowns.count))
-            jacobian[:, :size] = slope[:, :size] @ unknowns.to_coefficients
-            jacobian[:, unknowns.nuisance_positions(comparison.name)] = slope[:, size:]
+            by_law = slope[:, : unknowns.size] @ unknowns.to_coefficients
+            jacobian = np.hstack([by_law, slope[:, unknowns.size :]])
         else:
             history = comparison.run(law, unknowns.free, nuisance, warm)
         residual = comparison.objective.residual(history, nuisance)
@@ -494,11 +498,14 @@ class FitProblem:
         deviation = y[self.unknowns.size :] - self.unknowns.nuisance.start
         prior_residual = prior_slopes * deviation[positions]
         residual = np.concatenate([*(run.residual for run in runs), prior_residual])
-        jacobians = [run.jacobian for run in runs if run.jacobian is not None]
         jacobian = None
-        if jacobians:
-            unit_rows = np.eye(self.unknowns.count)[self.unknowns.size + positions]
-            jacobian = np.concatenate([*jacobians, prior_slopes[:, None] * unit_rows])
+        if all(run.jacobian is not None for run in runs):
+            jacobian = np.zeros((len(residual), self.unknowns.count))
+            for k, (comparison, run) in enumerate(zip(self.comparisons, runs, strict=True)):
+                columns = self.unknowns.columns_of(comparison.name)
+                jacobian[self.rows(k), columns] = run.jacobian
+            prior_rows = len(residual) - len(positions) + np.arange(len(positions))
+            jacobian[prior_rows, self.unknowns.size + positions] = prior_slopes
         histories = tuple(run.history for run in runs)
         is_stable = all(
             history.stable is not False
@@ -563,7 +570,7 @@ class WeightedProblem(FitProblem):
         blocks = problem.blocks
         of_blocks = blocks.norms(factors) / np.sqrt(blocks.sizes)
         of_blocks[of_blocks == 0] = 1.0
-        weighted.blocks = Blocks(blocks.sizes, of_blocks * blocks.least_norms)
+        weighted.blocks = Blocks(blocks.sizes, of_blocks * blocks.least_norms, blocks.columns)
         return weighted
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:

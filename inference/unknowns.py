@@ -188,6 +188,10 @@ class Unknowns:
         """Return the positions of a comparison's nuisance among the unknowns."""
         return self.size + self.nuisance.positions(comparison)
 
+    def columns_of(self, comparison: str) -> NDArray[np.intp]:
+        """Return the unknowns of a comparison: those of the law, then its nuisance."""
+        return np.concatenate([np.arange(self.size), self.nuisance_positions(comparison)])
+
     @cached_property
     def is_shear(self) -> NDArray[np.bool_]:
         """Return (count,) which unknowns are of G12, on which a membrane's stability depends."""

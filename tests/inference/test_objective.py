@@ -66,3 +66,17 @@ def test_block_that_fits_exactly_has_no_slope():
     keep = [0, 1, 5, 6, 7, 8]
     rest = Blocks([2, 4]).gradient(r[keep], j[keep])
     assert Blocks([2, 3, 4]).gradient(r, j) == pytest.approx(rest)
+
+
+def test_gram_of_blocks_leaves_out_unknowns_on_which_none_depends():
+    random = np.random.default_rng(0)
+    r, j = random.standard_normal(9), random.standard_normal((9, 4))
+    j[:5, 2:] = 0.0
+    blocks = Blocks([2, 3, 4], columns=[np.arange(2), np.arange(2), np.arange(4)])
+    weights = np.array([2.0, 0.5, 3.0])
+    rows = j * np.sqrt(weights)[blocks.block_of][:, None]
+    for of_blocks in (blocks, Blocks([2, 3, 4])):
+        np.testing.assert_allclose(of_blocks.gram(j, weights), rows.T @ rows)
+        gradients = of_blocks.gradients(r, j)
+        assert gradients.sum(axis=0) == pytest.approx(j.T @ r)
+        assert gradients[1] == pytest.approx(j[2:5].T @ r[2:5])

@@ -91,6 +91,21 @@ def test_comparisons_side_by_side_give_what_they_give_one_after_the_other():
         np.testing.assert_array_equal(a.warm_start.path, b.warm_start.path)
 
 
+def test_runs_without_derivatives_are_where_later_ones_start_also_side_by_side():
+    def analyses(processes):
+        fit = two_bubbles()
+        for comparison in fit.comparisons:
+            comparison.seconds = 1.0
+        y = fit.unknowns.at(LAW.beta * 1.02)
+        with may_run_at_once(processes):
+            return fit.evaluate(y, False), fit.evaluate(y, True)
+
+    for alone, together in zip(analyses(1), analyses(2), strict=True):
+        np.testing.assert_array_equal(alone.residual, together.residual)
+        for of_alone, of_together in zip(alone.histories, together.histories, strict=True):
+            assert of_alone.iterations == of_together.iterations
+
+
 def test_jacobian_of_two_bubbles_with_nuisance_against_differences():
     fit = two_bubbles()
     y = fit.unknowns.at(LAW.beta * 1.02)
