@@ -129,9 +129,16 @@ def loading_of(readings: BendingCurve, zero: Zero, location: str) -> BendingCurv
     Raises
     ------
     InputError
-        The first readings do not rise, and a line through them is to give the zero.
+        Deflections or loads are below zero, or the first readings do not rise, and a line through
+        them is to give the zero.
     """
     u = readings.deflection
+    for quantity, values in (("deflections", u), ("loads", readings.load)):
+        low, high = float(values.min()), float(values.max())
+        if -low > high:
+            problem = f"the {quantity} of {readings.repetition!r} go from {high:.4g} to {low:.4g}"
+            advice = "those of a bent cylinder are above zero: reverse their sign"
+            raise InputError(readings.path, location, f"{problem}, and {advice}")
     try:
         u = u - _zero_deflection(u, readings.load, zero)
     except ValueError:

@@ -22,7 +22,7 @@ WORDS = {
         "elongation": "elongation extension displacement disp crosshead stroke travel position"
         " weg standardweg traversenweg verfahrweg kolbenweg längenänderung"
         " déplacement deplacement allongement",
-        "load": "load force kraft standardkraft prüfkraft",
+        "load": "load force kraft standardkraft prüfkraft last",
         "time": "time zeit temps prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
@@ -32,7 +32,7 @@ WORDS = {
     }.items()
 }
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
-LOADS = frozenset("n f force load kraft stress spannung tension sigma σ".split())
+LOADS = frozenset("n f force load kraft last stress spannung tension sigma σ".split())
 STRAINS = frozenset("e eps epsilon ε strain dehnung".split())
 WARP = frozenset("w warp kette chaîne chaine x".split())
 FILL = frozenset("f fill weft schuss trame y".split())

@@ -69,6 +69,8 @@ def test_zero_of_deflection_and_load_on_the_beam(tmp_path, zero, deflection):
         ("deflection (mm),load (N),run\n0,0,a\n1,1,a\n0,0,b\n", {}, ["line 4", "'b'", "one read"]),
         ("deflection (mm),load (N)\n0,5\n1,4\n", {"zero": "line"}, ["line 2", "do not rise"]),
         ("deflection (mm),load (N)\n", {}, ["line 1", "no rows"]),
+        ("Durchbiegung (mm),Last (N)\n0,0\n-9,7\n", {}, ["deflections of 'test' go from 0 to -9"]),
+        ("deflection (mm),load (N)\n0,0\n9,-7\n", {}, ["loads", "0 to -7, and", "reverse their"]),
     ],
 )
 def test_mistake_in_bending_readings_names_file_and_line(tmp_path, text, how, words):
