@@ -226,30 +226,31 @@ def numbers_in_names(
     """
     values = np.array([number_in_name(file, units, pattern, unit, field) for file in files])
     if pattern is None and (doubtful := doubtful_name(files, units)):
-        file, (counter, mark, number, name) = doubtful
+        file, match = doubtful
+        counter, mark, number, name = match.groups()
+        behind = match[0][match.end(3) - match.start() :]
         problem = (
             f"{number} {name} may be {counter}.{number} {name}, and the names of the files do not "
             f"show which; write 1.5 with a point, or a pattern with one group says what is meant: "
-            rf"'(\d+{mark}\d+){name}' or '{mark}(\d+){name}', with its unit"
+            rf"'(\d+{mark}\d+){behind}' or '{mark}(\d+){behind}', with its unit"
         )
         raise InputError(file, field, problem)
     return values
 
 
-def doubtful_name(
-    files: Sequence[Path], units: Iterable[str]
-) -> tuple[Path, tuple[str, ...]] | None:
-    """Return a name with a number that may be the decimals of the one before it, and its parts."""
+def doubtful_name(files: Sequence[Path], units: Iterable[str]) -> tuple[Path, re.Match[str]] | None:
+    """Return a name with a number that may be the decimals of the one before it, and where."""
     split = re.compile(rf"(?<![\d.,])(\d+)([_ -]){_number_with(units)}")
     matches = [(file, match) for file in files if (match := split.search(file.stem))]
-    # One with a decimal mark, or a counter with zeros in front, says how all are meant.
-    if not matches or any(re.match(r"0\d|.*[.,]", match[0]) for _, match in matches):
+    # One with decimals or of three digits, or a counter with zeros in front, says what all are.
+    settled = re.compile(r"^0\d|[ _-](\d+[.,]|\d{3})")
+    if not matches or any(settled.search(match[0]) for _, match in matches):
         return None
     counters = np.array([int(match[1]) for _, match in matches])
     numbers = np.array([int(match[3]) for _, match in matches])
     if len(matches) == len(files) and _is_counted(counters, numbers):
         return None
-    return matches[0][0], matches[0][1].groups()
+    return matches[0]
 
 
 def _is_counted(counters: Array, numbers: Array) -> bool:
