@@ -24,6 +24,7 @@ KERNELS = (
     "meshes/closed_surfaces.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/nested_cholesky.py",
+    "inference/noise.py",
     "inference/posterior.py",
 )
 

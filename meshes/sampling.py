@@ -96,6 +96,7 @@ def _natural_coordinates(corners: Array, points: Array) -> Array:
     iterations = 12
     smallest_determinant = 1e-12  # mm^2
     farthest = 10.0  # natural coordinate at which a point is kept that lies far outside
+    rounding = 1e-14  # of a natural coordinate: smaller changes end the iteration
     first, second, third, fourth = np.swapaxes(corners, 0, 1)
     a = corners.mean(axis=1)
     b = 0.25 * (-first + second + third - fourth)
@@ -113,8 +114,11 @@ def _natural_coordinates(corners: Array, points: Array) -> Array:
         determinant = np.where(is_singular, smallest_determinant, determinant)
         step_s = _cross(gap, by_t) / determinant
         step_t = _cross(by_s, gap) / determinant
+        before = s, t
         s = np.clip(s - step_s, -farthest, farthest)
         t = np.clip(t - step_t, -farthest, farthest)
+        if np.abs(np.subtract((s, t), before)).max(initial=0.0) < rounding:
+            break
     return np.stack([s, t], axis=1)
 
 

@@ -309,11 +309,13 @@ def _errors_of_breaks(rows: Array, pairs: Array) -> Array:
     (pairs, 2) are the numbers of two breaks.
     """
     load = rows[:, -1]
-    terms = np.stack([rows[:, [0, *pair]] for pair in pairs + 1])
-    axes, singular_values, _ = np.linalg.svd(terms, full_matrices=False)
-    # A break that no point tells from another one adds no direction: its singular value is zero
+    columns = np.column_stack([np.zeros(len(pairs), dtype=int), pairs + 1])
+    terms = rows[:, columns].swapaxes(0, 1)
+    axes, upper = np.linalg.qr(terms)
+    # A break that no point tells from another one adds no direction: what is left of it is zero
     # but for rounding.
-    rounding = len(load) * np.finfo(float).eps * singular_values[:, :1]
-    axes *= (singular_values > rounding)[:, None]
+    left = np.abs(np.diagonal(upper, axis1=1, axis2=2))
+    rounding = len(load) * np.finfo(float).eps * left.max(axis=1, keepdims=True)
+    axes *= (left > rounding)[:, None]
     fitted = np.einsum("pki,pi->pk", axes, load @ axes)
     return ((load - fitted) ** 2).sum(axis=1)
