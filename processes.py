@@ -6,10 +6,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from functools import cache
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 M = TypeVar("M")
 V = TypeVar("V")
@@ -238,11 +241,26 @@ def one_blas_thread() -> Iterator[None]:
     The matrices are too small for several threads: on two busy cores `check` of 80,000 points took
     22 s of processor time with one thread per core, and 5 s with a single thread.
     """
-    from threadpoolctl import threadpool_limits
-
     is_chosen = any(os.environ.get(name) for name in _THREAD_VARIABLES)
-    with threadpool_limits(None if is_chosen else 1, user_api="blas"):
+    with nullcontext() if is_chosen else limit_blas(1):
         yield
+
+
+def limit_blas(threads: int) -> AbstractContextManager[Any]:
+    """Limit the threads of BLAS from now on, or within a block."""
+    return _blas().limit(limits=threads, user_api="blas")
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Return the control of the threads of BLAS: numpy and scipy have a library each.
+
+    That of scipy is loaded here, as one that came later would have a thread for each core.
+    """
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 @contextmanager

@@ -21,7 +21,6 @@ from typing import IO, Any
 import click
 
 from ..errors import BubblefitError, OutputError, did_you_mean
-from ..processes import one_blas_thread
 from ..storage.writing import json_text, output_errors, unwritable_reason
 from ..version import __version__
 
@@ -78,7 +77,7 @@ HEAD = "Examples:"
 
 
 def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Return a decorator that declares a command, in which BLAS has one thread.
+    """Return a decorator that declares a command.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Comm
     """
 
     def declare(function: Callable[..., Any]) -> click.Command:
-        return click.command(name, epilog=examples(*lines))(one_blas_thread()(function))
+        return click.command(name, epilog=examples(*lines))(function)
 
     return declare
 

@@ -19,12 +19,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import cloudpickle
-from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError, InputError
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
-from ..processes import cores
+from ..processes import cores, limit_blas
 from ..project.project import Project
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
@@ -488,7 +487,7 @@ def _task_of(series: str) -> Task:
     if state.task is None or state.series != series:
         if series not in _prepared:
             raise NotJoined(series)
-        state.limits = threadpool_limits(1)  # the worker's threads are what runs side by side
+        state.limits = limit_blas(1)  # the worker's threads are what runs side by side
         state.task = cloudpickle.loads(_prepared[series])()
         state.series = series
     task: Task = state.task

@@ -14,7 +14,7 @@ from typing import ParamSpec, TypeVar
 from ..errors import BubblefitError, OutputError
 from ..lazy_modules import filelock
 from ..notes import warn_of, without_warnings
-from ..processes import temporary_value
+from ..processes import one_blas_thread, temporary_value
 from ..solvers.scratch import owner_is_gone, owner_marks
 from ..storage.writing import output_errors
 
@@ -77,6 +77,7 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
 def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
     """Hold the folder that a function writes, its argument `out` or `folder`, while it runs.
 
+    BLAS has one thread meanwhile.
     Grave notes of the result are given to `warnings.warn`; those of fits within it are not.
     """
     signature = inspect.signature(function)
@@ -85,8 +86,9 @@ def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         arguments = signature.bind(*args, **kwargs).arguments
         folder = arguments.get("out", arguments.get("folder"))
-        with used_alone(folder), _unused_after_failure(folder), without_warnings():
-            result = function(*args, **kwargs)
+        with one_blas_thread(), used_alone(folder), _unused_after_failure(folder):
+            with without_warnings():
+                result = function(*args, **kwargs)
         warn_of(getattr(result, "notes", ()), CALLS_TO_USER)
         return result
 

@@ -3,6 +3,7 @@
 import contextvars
 import os
 import signal
+import sys
 from collections import Counter
 
 import pytest
@@ -15,6 +16,8 @@ from bubblefit.processes import (
     share_cores,
     share_of_cores,
 )
+
+from .support.commands import output_of
 
 
 def test_processes_share_the_cores():
@@ -116,3 +119,43 @@ def test_sharing_that_would_save_little_is_balanced():
         assert copies.is_balanced([3.0, 1.0, 1.0, 1.0])
         assert copies.is_balanced([3.0, 1.2, 1.2, 1.2])
         assert not copies.is_balanced([1.0, 1.0, 1.0, 1.0])
+
+
+#: Prints the numbers of threads of BLAS, a line each time, in a process that has loaded neither the
+#: library of numpy nor that of scipy before: in a block of one thread, after it, in an analysis.
+THREADS = """
+from bubblefit.processes import one_blas_thread
+
+def look(progress=None):
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+    print(*(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"))
+
+with one_blas_thread():
+    look()
+look()
+"""
+ANALYSIS = """
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+solver = MembraneSolver()
+solver.progress = look
+law = HypoelasticLaw.linear(800.0, 400.0, 20.0)
+solver.run(BubbleModel(disk_mesh(100.0, 48, "quarter"), 0.8, (0.05,)), law)
+look()
+"""
+
+
+@pytest.mark.parametrize("chosen", [{}, {"OPENBLAS_NUM_THREADS": "2"}], ids=["default", "chosen"])
+def test_all_libraries_of_blas_have_one_thread(chosen):
+    """The environment chooses for blocks, but not for analyses, whose matrices are too small."""
+    environment = {name: text for name, text in os.environ.items() if "_NUM_THREADS" not in name}
+    printed = output_of(sys.executable, "-c", THREADS + ANALYSIS, env=environment | chosen)
+    in_block, after_it, *in_analysis, at_last = [set(line.split()) for line in printed.splitlines()]
+    several = {chosen.get("OPENBLAS_NUM_THREADS", str(cores()))}
+    assert in_block == (several if chosen else {"1"})
+    assert after_it == at_last == several
+    assert in_analysis and all(threads == {"1"} for threads in in_analysis)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from ...errors import InputError
 from ...materials.deformation_curves import bar
@@ -16,6 +15,7 @@ from ...meshes.bubble_model import SLACK, TENSION, BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
+from ...processes import limit_blas
 from ...version import __version__
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
@@ -55,9 +55,6 @@ ANALYSES: dict[type, Analysis] = {
     TubeModel: Analysis(homogeneous_tube.prepare, homogeneous_tube.analyse),
     BeamModel: Analysis(beam.prepare, beam.analyse),
 }
-# The bands are too small to share: where another program uses a core, BLAS threads that wait for
-# each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
-BLAS = ThreadpoolController()
 
 
 class MembraneSolver:
@@ -167,7 +164,6 @@ class MembraneSolver:
             raise LookupError("no run of a membrane yet: there is no stress")
         return self._prepared[1].stress_old.copy()
 
-    @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
         self,
         model: Any,
@@ -186,7 +182,10 @@ class MembraneSolver:
         if isinstance(model, BubbleModel) and any((*model.tension, *set(TENSION) & {*parameters})):
             return self._analyse_stretched(model, law, parameters, guess)
         request = RunRequest(parameters, guess, self.progress)
-        return analyse(self._membrane(model, law), model, request)
+        # The bands are too small to share: where another program uses a core, BLAS threads that
+        # wait for each other made an analysis 12 to 290 times slower (bench_cost.py analysis).
+        with limit_blas(1):
+            return analyse(self._membrane(model, law), model, request)
 
     def _analyse_stretched(
         self,
