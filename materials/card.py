@@ -154,10 +154,11 @@ def certainty_of(
         for ratio in base.ratios_of(law.form, name):
             modulus = law.modulus(name, strain, ratio)[:, None]
             relative.append(law.modulus_rows(name, strain, ratio)[:, free] / modulus)
-    weighed = np.vstack(relative) @ spread.T
-    _, sizes, directions = np.linalg.svd(weighed, full_matrices=False)
-    significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
-    normal = CardCertainty(significant @ spread, words)
+    # The rows of `upper` have the directions of the draws, and are as few as the coefficients.
+    upper = np.linalg.qr(spread).R
+    _, sizes, directions = np.linalg.svd(np.vstack(relative) @ upper.T, full_matrices=False)
+    significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)]
+    normal = CardCertainty(significant @ upper, words)
     is_normal = all(
         _is_normal_band(normal, law, name, band) for name, band in (bands or {}).items()
     )

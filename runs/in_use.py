@@ -89,8 +89,8 @@ def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
         with one_blas_thread(), used_alone(folder), _unused_after_failure(folder):
             with without_warnings():
                 result = function(*args, **kwargs)
-        warn_of(getattr(result, "notes", ()), CALLS_TO_USER)
-        return result
+            warn_of(getattr(result, "notes", ()), CALLS_TO_USER)
+            return result
 
     return wrapped
 
