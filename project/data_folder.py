@@ -101,6 +101,9 @@ NUMBERS = re.compile(
 )
 
 
+ANY_NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
+
+
 @dataclass(frozen=True, eq=False)
 class FileGroup:
     """Files of one folder whose names differ in numbers only.
@@ -322,14 +325,20 @@ def _add_curvatures(apex: GaugedBubble, table: MachineTable, columns: Sequence[s
     apex.add_unit("curvature_unit", table, columns, unit)
 
 
-def pressure_of(file: Path) -> float | None:
-    """Return the pressure (kPa) in the name or the first lines of a file; None without one."""
+def pressure_in_name(file: Path) -> float | None:
+    """Return the pressure (kPa) in the name of a file; None without one."""
     try:
         return 1e3 * number_in_name(file, PRESSURE_UNITS)
     except InputError:
-        statement = PRESSURE.search(_head(file)[:1000])
-    if statement is None:
         return None
+
+
+def pressure_of(file: Path) -> float | None:
+    """Return the pressure (kPa) in the name or the first lines of a file; None without one."""
+    pressure = pressure_in_name(file)
+    statement = PRESSURE.search(_head(file)[:1000])
+    if pressure is not None or statement is None:
+        return pressure
     units = {unit.casefold(): size for unit, size in PRESSURE_UNITS.items()}
     return 1e3 * units[statement[1].casefold()] * parse_number(statement[2])
 
@@ -372,7 +381,29 @@ def recognised_groups(data: Path) -> list[FileGroup]:
         if file.is_file() and file.name[0] != ".":
             pattern = NUMBERS.sub("*", file.stem) + file.suffix
             groups.setdefault(file.with_name(pattern), []).append(file)
-    return [_recognised(files, pattern, data) for pattern, files in groups.items()]
+    return _with_joint_frames(
+        [_recognised(files, pattern, data) for pattern, files in groups.items()], data
+    )
+
+
+def _with_joint_frames(groups: Sequence[FileGroup], data: Path) -> list[FileGroup]:
+    """Return groups with frames that stand alone by their counters, as Bild1_50kPa, in one.
+
+    They are of one test as their pressures differ.
+    """
+    alone: dict[Path, list[FileGroup]] = {}
+    for group in groups:
+        file = group.files[0]
+        if group.role == FRAMES and len(group.files) == 1 and pressure_in_name(file) is not None:
+            pattern = file.with_name(ANY_NUMBER.sub("*", file.stem) + file.suffix)
+            alone.setdefault(pattern, []).append(group)
+    joint_groups = [*groups]
+    for pattern, members in alone.items():
+        files = [group.files[0] for group in members]
+        if len({*map(pressure_in_name, files)}) == len(files) > 1:
+            joint_groups[joint_groups.index(members[0])] = _recognised(files, pattern, data)
+            joint_groups = [group for group in joint_groups if group not in members]
+    return joint_groups
 
 
 def _recognised(files: Sequence[Path], pattern: Path, data: Path) -> FileGroup:

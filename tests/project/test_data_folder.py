@@ -58,6 +58,24 @@ def test_frames_without_heights_and_with_a_pressure_in_each(tmp_path):
     assert (test["column"], test["in_camera_axes"], test["sizes"]) == ("p", False, ["radius"])
 
 
+@pytest.mark.parametrize(
+    ("names", "counts"),
+    [
+        ("Bild1_500mbar Bild2_1000mbar Bild10_1500mbar", [3]),
+        # Of one pressure they are tests of their own.
+        ("test1_500mbar test2_500mbar", [1, 1]), ("bubble1 bubble1_20kPa", [1, 1]),
+    ],
+)  # fmt: skip
+def test_frames_that_stand_alone_by_their_counter_are_one_test(tmp_path, names, counts):
+    rows = "\n".join(f"{x},{y},0.1,0.2,5" for x in (-50, 0, 50) for y in (-50, 0, 50))
+    for name in names.split():
+        (tmp_path / f"{name}.csv").write_text(f"x,y,dx,dy,dz\n{rows}\n")
+    tests = proposed_tests(recognised_groups(tmp_path))
+    assert [test["count_of_files"] for test in tests] == counts
+    if len(counts) == 1:
+        assert tests[0]["is_named"] and tests[0]["files"] == ["Bild*_*mbar.csv"]
+
+
 @pytest.mark.parametrize(("off", "in_camera_axes"), [(4.9, False), (5.9, True), (-5.9, True)])
 def test_points_a_twentieth_off_centre_are_in_camera_axes(tmp_path, off, in_camera_axes):
     rows = [f"{x},{y + off},0,0,0,{x * y}" for x in (-50, 0, 50) for y in (-50, 0, 50)]
