@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -185,12 +187,48 @@ def _shares(seconds: Sequence[float], processes: int, *, least: float = 0.01) ->
     return shares
 
 
+#: Bytes of arrays that a copy returns by memory that both processes share, several times as fast as
+#: by a pipe; it is taken from the machine only as far as it is used.
+_SHARED_BYTES = 1 << 28
+
+
+class _SharedMemory:
+    """Memory that this process shares with its copies, for the arrays of results."""
+
+    def __init__(self, size: int = _SHARED_BYTES) -> None:
+        import mmap
+
+        self._bytes = memoryview(mmap.mmap(-1, size))
+
+    def pack(self, results: Any) -> tuple[bytes, list[int]]:
+        """Return results pickled without arrays, which are written here, and the sizes of these."""
+        buffers: list[pickle.PickleBuffer] = []
+        content = pickle.dumps(results, protocol=5, buffer_callback=buffers.append)
+        arrays = [buffer.raw() for buffer in buffers]
+        if sum(array.nbytes for array in arrays) > len(self._bytes):
+            return pickle.dumps(results), []
+        start = 0
+        for array in arrays:
+            self._bytes[start : start + array.nbytes] = array
+            start += array.nbytes
+        return content, [array.nbytes for array in arrays]
+
+    def unpack(self, content: bytes, sizes: Sequence[int]) -> Any:
+        """Return the results that a copy has packed."""
+        ends = list(itertools.accumulate(sizes))
+        arrays = [
+            bytearray(self._bytes[end - size : end]) for size, end in zip(sizes, ends, strict=True)
+        ]
+        return pickle.loads(content, buffers=arrays)  # noqa: S301 - written by a copy of this process
+
+
 class _Copy:
     """A copy of this process, and the pipe to it."""
 
     def __init__(self, do: Callable[[int, Any], Any]) -> None:
         import multiprocessing
 
+        self._memory = _SharedMemory()
         self._connection, connection = multiprocessing.Pipe()
         self._number = os.fork()
         if self._number == 0:
@@ -200,7 +238,8 @@ class _Copy:
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
                 _scope.set(None)  # a task makes no copies itself
                 while True:
-                    connection.send([do(k, message) for k, message in connection.recv()])
+                    results = [do(k, message) for k, message in connection.recv()]
+                    connection.send(self._memory.pack(results))
             finally:
                 os._exit(0)  # nothing else of the process copied is run
         connection.close()
@@ -213,7 +252,7 @@ class _Copy:
     def receive(self) -> list[Any] | None:
         """Return the results of the tasks, None if the copy has died."""
         try:
-            return self._connection.recv()
+            return self._memory.unpack(*self._connection.recv())
         except (EOFError, OSError):
             return None
 

@@ -6,8 +6,10 @@ import signal
 import sys
 from collections import Counter
 
+import numpy as np
 import pytest
 from bubblefit.processes import (
+    _SharedMemory,
     _shares,
     copies_for,
     cores,
@@ -101,6 +103,21 @@ def test_task_of_a_copy_that_died_is_done_here():
         copies = copies_for(do, [1.0, 1.0])
         assert copies.run([None, None]) == [0, 1]
         assert copies.run([None, None]) == [0, 1]
+
+
+@pytest.mark.parametrize("size", [64, 10_000])
+def test_arrays_of_a_copy_come_back_as_they_were_if_memory_holds_them_or_not(size):
+    rows = np.arange(12.0).reshape(3, 4)
+    results = [{"rows": rows, "columns": rows.T, "part": rows[:, 1], "words": "as before"}, None]
+    memory = _SharedMemory(size)
+    content, sizes = memory.pack(results)
+    assert bool(sizes) == (size > 2 * rows.nbytes)
+    copied, nothing = memory.unpack(content, sizes)
+    memory.pack([np.zeros(24)])
+    assert nothing is None and copied["words"] == "as before"
+    for name in ("rows", "columns", "part"):
+        np.testing.assert_array_equal(copied[name], results[0][name])
+    copied["rows"][:] = 0.0
 
 
 def test_error_in_a_copy_is_raised_here():
