@@ -505,7 +505,9 @@ def _gauge_bubbles(groups: Sequence[FileGroup]) -> list[Settings]:
         if not table.has_pressure:
             pressures = [pressure_of(file) for file in group.files]
             is_split = doubtful_name(group.files, PRESSURE_UNITS) is not None
-            is_told = None not in pressures and not is_split
+            # Those of all lines are the same.
+            previous = test.pop("pressures", pressures)
+            is_told = None not in pressures and not is_split and previous == pressures
             test |= {"pressures": pressures} if is_told else {"sizes": ["radius", "pressures"]}
             test["count_of_files"] = len(group.files)
         test["is_central"] = table.is_central and test.get("is_central", True)

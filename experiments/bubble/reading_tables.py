@@ -15,7 +15,7 @@ from ...lazy_modules import pandas as pd
 from ...readers.frames import frame_files
 from ...readers.inflations import branches_of
 from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
-from ...readers.quantities import columns_named, columns_of, is_along_fill
+from ...readers.quantities import FILL, WARP, columns_named, columns_of, is_along_fill
 from ...readers.units import CURVATURE_UNITS, LENGTH_UNITS, PRESSURE_UNITS, STRAIN_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile
@@ -41,7 +41,7 @@ CHANNELS: Mapping[str, tuple[Mapping[str, float], str]] = {
     "strain": (STRAIN_UNITS, "strain_unit"),
 }
 #: Directions of lines and curvatures, degrees from the warp.
-AXES = {"x": 0.0, "y": 90.0, "warp": 0.0, "fill": 90.0}
+AXES = dict.fromkeys(WARP, 0.0) | dict.fromkeys(FILL, 90.0)
 #: Span of curvatures and strains over the radius, where it is not given.
 USUAL_SPAN = 0.2
 
@@ -165,8 +165,8 @@ def _profiles(
     tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
     if not tables:
         return []
-    under_pressure = _with_pressures(tables, place, pressures)
-    lines = _with_axes(under_pressure, section, files[first:])
+    along_lines = _with_axes(tables, section, files[first:], place)
+    lines = _with_pressures(along_lines, place, pressures)
     points, left_out = _profiles_of_inflation(lines, inflation)
     moves = section.moves_with_sheet
     series = []
@@ -183,26 +183,46 @@ def _profiles(
 def _with_pressures(
     tables: Sequence[pd.DataFrame], place: Place, pressures: Sequence[float] | None
 ) -> Sequence[pd.DataFrame]:
-    """Return tables of profiles with a column of pressures (MPa), one a table if they have none."""
-    for column in ("pressure", "axis", "specimen"):
-        if len({column in table for table in tables}) > 1:
-            problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
-            raise place.error("data.profiles.files", f"{problem} or in none")
+    """Return tables of profiles with a column of pressures (MPa).
+
+    Where they have none, those of each line are one a table.
+    """
+    for column in ("pressure", "specimen"):
+        _check_in_all(tables, column, place)
     if "pressure" in tables[0]:
         return tables
-    if pressures is None or len(pressures) != len(tables):
-        problem = f"expected one for each of {len(tables)} tables without such a column"
-        raise place.error("pressures", problem)
-    return [table.assign(pressure=p) for table, p in zip(tables, pressures, strict=True)]
+    by_axis: dict[str, list[pd.DataFrame]] = {}
+    for table in tables:
+        by_axis.setdefault(table["axis"].iloc[0], []).append(table)
+    for axis, along in by_axis.items():
+        if pressures is None or len(pressures) != len(along):
+            problem = f"expected one for each of {len(along)} tables without such a column"
+            raise place.error("pressures", f"{problem}, along {axis}")
+    return [
+        table.assign(pressure=pressure)
+        for along in by_axis.values()
+        for table, pressure in zip(along, pressures or (), strict=True)
+    ]
+
+
+def _check_in_all(tables: Sequence[pd.DataFrame], column: str, place: Place) -> None:
+    """Refuse a column that some tables of profiles have, and others not."""
+    if len({column in table for table in tables}) > 1:
+        problem = f"expected a column of the {column} in all tables of [bubble.data.profiles]"
+        raise place.error("data.profiles.files", f"{problem} or in none")
 
 
 def _with_axes(
-    tables: Sequence[pd.DataFrame], section: ProfilesSection, files: Sequence[DataFile]
+    tables: Sequence[pd.DataFrame],
+    section: ProfilesSection,
+    files: Sequence[DataFile],
+    place: Place,
 ) -> Sequence[pd.DataFrame]:
     """Return tables of profiles with a column of axes, that of one line a table if they have none.
 
     The line is along the fill where the name of its coordinate says that, and the section nothing.
     """
+    _check_in_all(tables, "axis", place)
     if "axis" in tables[0]:
         return tables
     axes = [str(section.direction_deg)] * len(tables)

@@ -202,14 +202,16 @@ def test_forward_analysis_needs_no_table_but_pressures(tmp_path):
 def test_profiles_of_several_lines_and_pressures_in_one_table(tmp_path):
     rows = [
         f"{axis},{p},{s},{h * (1 - (s / 100) ** 2)}"
-        for axis in ("x", "y", "30")
+        for axis in ("x", "Schuss", "30")
         for p, h in zip(KILO, RISE, strict=True)
         for s in range(-90, 91, 3)
     ]
     (tmp_path / "p.csv").write_text("axis,p_kPa,coord_mm,z_mm\n" + "\n".join(rows))
     test = bubble_of(tmp_path, PROJECT + '[bubble.data.profiles]\nfiles = ["p.csv"]\n')
     x, y, inclined = test.data.series
-    assert [s.label for s in test.data.series] == [f"heights along {a}" for a in ("x", "y", "30")]
+    assert [s.label for s in test.data.series] == [
+        f"heights along {a}" for a in ("x", "Schuss", "30")
+    ]
     assert len(x.value) == 4 * 40 and not x.positions[:, 1].any()
     np.testing.assert_allclose(y.positions[:, 1], x.positions[:, 0], atol=1e-9)
     np.testing.assert_allclose(np.hypot(*inclined.positions.T), np.abs(x.positions[:, 0]))
@@ -226,6 +228,19 @@ def test_profiles_of_a_file_a_pressure_take_the_listed_pressures(tmp_path):
     np.testing.assert_allclose(np.unique(series.pressure), [0.01, 0.04])
     assert not series.positions[:, 0].round(9).any()
     assert "expected one for each of 2" in refusal(tmp_path, PROJECT + keys)
+    # Files of the other line, between them or behind them, are at the same pressures.
+    for name in ("p0", "p1"):
+        text_of_fill = (tmp_path / f"{name}.csv").read_text().replace("s (mm)", "y (mm)")
+        (tmp_path / f"{name}_fill.csv").write_text(text_of_fill)
+    for files in ("p0 p0_fill p1 p1_fill", "p0 p1 p0_fill p1_fill"):
+        names = ", ".join(f'"{name}.csv"' for name in files.split())
+        text = PROJECT.replace("radius", "pressures = [10, 40]\nradius")
+        text += f"[bubble.data.profiles]\nfiles = [{names}]\n"
+        for along, across in zip(bubble_of(tmp_path, text).data.series, (1, 0), strict=True):
+            assert not along.positions[:, across].round(9).any()
+            heights = [along.value[along.pressure == p].max() for p in (0.01, 0.04)]
+            np.testing.assert_allclose(heights, [10.0, 15.0])
+    assert "one for each of 1" in refusal(tmp_path, text.replace('"p0.csv", ', ""))
 
 
 def test_profiles_of_named_specimens_are_kept_apart(tmp_path):
