@@ -50,10 +50,10 @@ class LinearisedFit:
         Orthonormal directions that the data determine, and those that they do not.
     curvature : (sharp,) array
         Second derivative of half the weighted sum of squares along each determined direction.
-    estimator : (unknowns, m) array
-        Matrix whose product with weighted residuals is minus the change of the unknowns by them.
-    response : (unknowns, m) array
-        Change of the unknowns by each residual.
+    inverse : (unknowns, unknowns) array
+        Inverse of that derivative, zero along undetermined directions.
+    jacobian, response_slopes : (m, unknowns) arrays
+        Derivatives of the weighted residuals, and those of what noise changes of them.
     noise : Noise
     """
 
@@ -62,9 +62,15 @@ class LinearisedFit:
     sharp: Array
     undetermined: Array
     curvature: Array
-    estimator: Array
-    response: Array
+    inverse: Array
+    jacobian: Array
+    response_slopes: Array
     noise: Noise
+
+    @property
+    def response(self) -> Array:
+        """Return the change of the unknowns by each residual, (unknowns, m)."""
+        return (self.inverse @ self.response_slopes.T) * self.weights
 
     @cached_property
     def noise_response(self) -> Array:
@@ -104,7 +110,9 @@ class LinearisedFit:
         weights = np.sqrt(weights_of(problem, best.residual, noise))
         sizes = sizes_of(problem.unknowns, best.unknowns)
         jacobian = best.jacobian * sizes * weights[:, None]
-        curvature, directions = np.linalg.eigh(jacobian.T @ jacobian)
+        curvature, directions = np.linalg.eigh(
+            problem.blocks.gram(jacobian, np.ones(len(problem.blocks.sizes)))
+        )
         is_determined = curvature > 1e-13 * curvature[-1]  # else the data say nothing of it
         sharp = directions[:, is_determined]
         full_curvature = np.diag(curvature[is_determined])
@@ -113,16 +121,15 @@ class LinearisedFit:
             full_curvature = full_curvature + sharp.T @ second.hessian_term @ sharp
             block_slopes = second.slopes(problem, jacobian)
             response_slopes = jacobian - second.unit_residual[:, None] * block_slopes
-        inverse = sharp @ np.linalg.inv(full_curvature) @ sharp.T
-        response = (inverse @ response_slopes.T) * weights
         return cls(
             sizes,
             weights,
             sharp,
             undetermined=directions[:, ~is_determined],
             curvature=curvature[is_determined],
-            estimator=inverse @ jacobian.T,
-            response=response,
+            inverse=sharp @ np.linalg.inv(full_curvature) @ sharp.T,
+            jacobian=jacobian,
+            response_slopes=response_slopes,
             noise=noise,
         )
 
@@ -230,7 +237,8 @@ def posteriors_of(
     exact = LinearisedFit.of(problem, best, noiseless, second)
 
     def centre(residual: Array) -> Array:
-        return best.unknowns - sizes * (exact.estimator @ (exact.weights * residual))
+        change = exact.inverse @ (exact.jacobian.T @ (exact.weights * residual))
+        return best.unknowns - sizes * change
 
     posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), linear.covariance)
     if limit is None:

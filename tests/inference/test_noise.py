@@ -16,6 +16,7 @@ from bubblefit.inference.noise import (
     notes_of_noise,
     small_sample_factor,
 )
+from bubblefit.processes import may_run_at_once
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.ndimage import gaussian_filter
 
@@ -29,6 +30,7 @@ from .cases import (
     correlated_noise_root,
     one_comparison_problem,
     reference,
+    two_bubbles,
 )
 
 NOISE = 0.05
@@ -39,6 +41,19 @@ def fit_of_fields(given):
     data = [FieldTarget(p, u, positions=NODES) for p, u in fields]
     objective = FieldObjective(data, "e", noise=given)
     return one_comparison_problem(MODEL, MembraneSolver(), LAW, objective, CONSTANT)
+
+
+def test_noise_of_tests_side_by_side_is_that_of_one_after_the_other():
+    fit = two_bubbles()
+    residual = fit.evaluate(fit.unknowns.at(LAW.beta * 1.1), False).residual
+    noises = []
+    for processes in (1, 2):
+        with may_run_at_once(processes):
+            noises.append(Noise.from_residual(fit, residual))
+    alone, together = noises
+    assert alone.level == together.level and list(alone.level) == ["bubble 1", "bubble 2"]
+    assert alone.correlated_count == together.correlated_count
+    np.testing.assert_array_equal(alone.residual_sigma, together.residual_sigma)
 
 
 @pytest.mark.parametrize("length", [1e-3, 15.0])

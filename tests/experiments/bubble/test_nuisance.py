@@ -170,7 +170,8 @@ def test_estimates_scatter_as_much_as_their_covariance_says(level, section):
     for seed in seeds:
         noisy = problem_of(seed=seed, noise_of_data=level, **section)
         change = noisy.evaluate(truth, False).residual - without_noise
-        estimates.append(fitted.estimator @ (fitted.weights * change))
+        weighted = fitted.weights * change
+        estimates.append(fitted.inverse @ (fitted.jacobian.T @ weighted))
     moduli = np.array(estimates)[:, :3]
     covariance = (fitted.noise_response @ fitted.noise_response.T)[:3, :3]
     chi_square = np.sum(moduli.T * np.linalg.solve(covariance, moduli.T), axis=0)
