@@ -32,6 +32,7 @@ from ..experiments.forward import RunRecord
 from ..lazy_modules import pandas as pd
 from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..presenting import DRAWINGS, PAGES
+from ..processes import one_blas_thread
 from ..project.project import Project
 from ..project.sections import InMemory, project_text
 from ..solvers.base import History, Solver
@@ -388,6 +389,7 @@ class KeptAnalyses(RunCache):
             raise error
 
 
+@one_blas_thread()
 def write_page(result: object, folder: Path) -> Path:
     """Write all files of a result by the presenter of its class; return the path of the page."""
     write = PAGES.of(result)
@@ -396,6 +398,7 @@ def write_page(result: object, folder: Path) -> Path:
     return write(result, folder)
 
 
+@one_blas_thread()
 def draw(result: object, drawing: str, *arguments: Any) -> Any:
     """Return the drawing of that name of a result, for a notebook."""
     drawings = DRAWINGS.of(result) or {}

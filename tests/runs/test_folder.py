@@ -13,12 +13,16 @@ from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.measures import run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.notes import Note
+from bubblefit.presenting import PAGES
+from bubblefit.processes import _THREAD_VARIABLES, limit_blas
 from bubblefit.project.schema import usual_folder
 from bubblefit.runs import fit_folder
-from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store
+from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store, write_page
+from bubblefit.runs.in_use import alone_in_folder
 from bubblefit.solvers.base import SNAP
 from bubblefit.storage import writing
 from bubblefit.storage.writing import json_text
+from threadpoolctl import threadpool_info
 
 from ..builders.bent_cylinders import FAILS, STOPS, ClosedFormCylinder, ran
 from ..builders.stored_runs import law, model
@@ -223,3 +227,17 @@ def test_unfinished_files_of_a_killed_process_are_removed(tmp_path):
     Store(tmp_path).begin({}, False, False)
     left = sorted(path.name for path in tmp_path.iterdir())
     assert left == sorted([RUN, ours, ".hidden", ".a.b", "notes.999999999.txt"])
+
+
+def test_long_work_and_pages_have_one_thread_of_blas(tmp_path, monkeypatch):
+    """Strains for the maps of a page took a second longer, as threads waited for each other."""
+    for name in _THREAD_VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+
+    def threads(*_):
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    monkeypatch.setattr(PAGES, "of", lambda result: threads)
+    with limit_blas(2):
+        assert threads() == {2}
+        assert write_page(None, tmp_path) == alone_in_folder(threads)() == {1}
