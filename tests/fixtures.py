@@ -44,6 +44,14 @@ def drawings(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
+def unflushed():
+    """Leave what tests write to the system: no test takes the power away."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda number: None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
 def one_thread():
     """As in a study: BLAS threads on so small a band cost more than they bring."""
     with threadpool_limits(1):

@@ -98,8 +98,12 @@ def test_workflows_run_commands_with_valid_options():
 
 
 NOTEBOOK = EXAMPLES / "notebook" / "first-fit.ipynb"
-#: Numbers of starts and samples in notebooks, and fewer of them, as no test looks at the results.
-FEWER = {"fit(project, starts=2": "fit(project, starts=1", '"specimens", 60': '"specimens", 10'}
+#: Numbers of starts, samples and quads in notebooks, and fewer of them: no test looks at results.
+FEWER = {
+    "fit(project, starts=2": "fit(project, starts=1",
+    '"specimens", 60': '"specimens", 10',
+    "elements=108": "elements=48",
+}
 
 
 @pytest.fixture(scope="module")

@@ -37,6 +37,16 @@ def test_replaced_file_is_whole_or_as_before(tmp_path):
     assert [file.name for file in path.parent.iterdir()] == ["table.csv"]
 
 
+def test_text_is_on_the_disk_before_it_replaces_the_file(tmp_path, monkeypatch):
+    path = tmp_path / "result.json"
+    steps = []
+    monkeypatch.setattr(os, "fsync", lambda number: steps.append(("flushed", path.exists())))
+    replace = os.replace
+    monkeypatch.setattr(os, "replace", lambda *paths: steps.append("replaced") or replace(*paths))
+    writing.write_text(path, "1")
+    assert steps == [("flushed", False), "replaced"] and path.read_text() == "1"
+
+
 def test_numbers_of_a_table_are_those_that_pandas_writes(tmp_path):
     numbers = [0.1, -0.0, math.nan, math.inf, 1e-300, 123456789012.0, 1 / 3]
     table = pd.DataFrame({"a": numbers, "b, c": np.float32(numbers), "d": 2**60, "e": "x,y"})
