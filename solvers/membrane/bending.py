@@ -13,7 +13,6 @@ from ..base import EARLY, SNAP, History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
 from .loading import Loading, NoEquilibrium, RunRequest, march, straight_on
-from .relaxation import settled
 from .sensitivity import Neighbours
 
 #: Kinds of notes on a bending.
@@ -213,8 +212,6 @@ class BendingAnalysis:
             return inflated
         displacement = self.membrane.equilibrium(inflated, self.inflated.pressure)
         if displacement is None:
-            displacement = settled(self.membrane, inflated)
-        if displacement is None:
             raise SolverFailure("no equilibrium of the inflated tube under its weight")
         self.neighbours.follow(self.membrane, displacement)
         self.membrane.accept()
@@ -376,9 +373,7 @@ class CollarMotion(Loading):
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
         self.move(level)
-        displacement = self.membrane.equilibrium(start, self.membrane.pressure)
-        # Newton's iteration fails where wrinkles come and go, and at a limit load.
-        return displacement if displacement is not None else settled(self.membrane, start)
+        return self.membrane.equilibrium(start, self.membrane.pressure)
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         self.expected = straight_on(levels, path, level)

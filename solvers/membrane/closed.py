@@ -21,13 +21,14 @@ from .factorisation import BorderedTangent, Tangent, by_near_inverse, tangent_fo
 from .flexure import Flexure, flexure_of
 from .kernel import reference_elements
 from .line_search import SETTINGS as LINE_SEARCH
-from .line_search import searched_equilibrium
+from .line_search import LineSearchSettings, searched_equilibrium
 from .membrane import Membrane, arrays_of, initial_stiffness, refuse_memory
 from .wall import STIFF, Wall
 
-#: Of steps of a viscous motion: where the wall folds, steps that gain little for a while still lead
-#: to an equilibrium, and the motion would come to rest before its end without them.
-VISCOUS_SEARCH = replace(LINE_SEARCH, max_fruitless=LINE_SEARCH.max_steps)
+#: Before a membrane touches bodies, its equilibrium is as near as that of Newton's method.
+PRECISE = replace(LINE_SEARCH, tolerance_factor=1.0)
+#: From the unloaded state, where the tangent is definite but soft: flat facets carry no pressure.
+FROM_SLACK = replace(PRECISE, initial_viscosity=10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +142,10 @@ class ClosedMembrane(Membrane):
     slack : float, MPa
         Artificial isotropic stress that stiffens the next tangent but is in no residual; every
         tangent reduces it.
-    viscosity : float, MPa/mm
-        Resistance per area to a motion away from `anchor`; 0 for none.
-    anchor : (n, 3) ndarray, mm
-        See `drag`.
+    resistance : float, MPa/mm
+        Viscosity in the tangent.
+    needed_viscosity : float
+        The last one that made a tangent positive definite; see `resist`.
     dead : (3 n,) ndarray, N, or None
         Minus the dead loads on the nodes.
     pressure, volume : float, MPa and mm^3
@@ -179,8 +180,8 @@ class ClosedMembrane(Membrane):
     bodies: Sequence[RigidCylinder] = ()
     penalty: float = 5.0
     slack: float = 0.0
-    viscosity: float = 0.0
-    anchor: Array = field(init=False)
+    resistance: float = 0.0
+    needed_viscosity: float = 0.0
     dead: Array | None = None
     pressure: float = 0.0
     volume: float = 0.0
@@ -239,12 +240,26 @@ class ClosedMembrane(Membrane):
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
         if self.bodies:
-            settings = VISCOUS_SEARCH if self.viscosity > 0 else LINE_SEARCH
-            return searched_equilibrium(self, u, pressure, settings)
+            return self.rest(u, pressure, LINE_SEARCH)
         return super().equilibrium(u, pressure)
 
+    def rest(
+        self, u: Array, pressure: float, settings: LineSearchSettings = PRECISE
+    ) -> Array | None:
+        """Return the stable equilibrium (n, 3) mm to which the membrane descends, or None.
+
+        Parameters
+        ----------
+        u : array
+            Displacement (n, 3) mm to start from, where the membrane may be slack or fold.
+        pressure : float
+            In MPa; without effect if there is a gas.
+        settings : LineSearchSettings
+        """
+        return searched_equilibrium(self, u, pressure, settings)
+
     def further_forces(self, u: Array, with_tangent: bool) -> None:
-        """Add forces of the wall's bending, cords, viscosity, dead loads and contact.
+        """Add forces of the wall's bending, cords, dead loads and contact.
 
         Parameters
         ----------
@@ -262,18 +277,11 @@ class ClosedMembrane(Membrane):
         if with_tangent and self.slack > 0:
             self.add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= self.slack_fade
-        if self.viscosity > 0:
-            self._add_viscosity(u, with_tangent)
+        if with_tangent:
+            self.resistance = 0.0
         if self.dead is not None:
             self.residual += self.dead
         self._add_contact(u, with_tangent)
-
-    def _add_viscosity(self, u: Array, with_tangent: bool) -> None:
-        """Add the viscous resistance to the displacement u (nodes, 3) mm away from the anchor."""
-        drag = self.viscosity * self.node_area[:, None]
-        self.residual += (drag * (u - self.anchor)).reshape(-1)
-        if with_tangent:
-            self.add(self.node_slot, drag[:, None] * np.eye(3))
 
     def _add_contact(self, u: Array, with_tangent: bool) -> None:
         """Add the forces of rigid bodies on the nodes, at the displacement u (nodes, 3) mm."""
@@ -315,6 +323,8 @@ class ClosedMembrane(Membrane):
         (free,) array, mm
             The step as it was where it needs no correction, or none is found.
         """
+        if not self.bodies:
+            return step
         before = self.residual[self.free]
         limit = self.contact_tolerance * float(np.linalg.norm(before))
         linear = before + np.sum(self.contact, axis=0).reshape(-1)[self.free]
@@ -385,16 +395,20 @@ class ClosedMembrane(Membrane):
         shares = np.einsum("mp,pn->mn", point_weight, self.elements.values)
         return np.asarray(np.bincount(self.quads.ravel(), shares.ravel()), dtype=float)
 
-    def drag(self, viscosity: float, anchor: Array) -> None:
-        """Set a viscous resistance to motion away from the displacement `anchor` (n, 3) mm.
+    def resist(self, viscosity: float) -> None:
+        """Replace the viscosity in the tangent, which resists every motion.
 
         Parameters
         ----------
         viscosity : float
-            Pressure of the resistance per distance, MPa/mm; 0 for no resistance.
+            Pressure of the resistance per distance, as a multiple of the pressure in the membrane
+            over the size of a typical quad.
         """
-        self.viscosity = viscosity
-        self.anchor = anchor
+        resistance = viscosity * abs(self.pressure) / (2.0 * self.step_limit)
+        if resistance != self.resistance:
+            added = (resistance - self.resistance) * self.node_area
+            self.add(np.einsum("nkk->nk", self.node_slot), added[:, None])
+            self.resistance = resistance
 
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
         """Return the share of a surface that carries no tension in one direction.

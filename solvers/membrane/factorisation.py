@@ -188,6 +188,10 @@ class Tangent(Protocol):
         """Factorise what is near `data` and cheaper; SingularTangent on failure."""
         self.factor()
 
+    def renew_definite(self) -> bool:
+        """Factorise the symmetric part of `data` if it is positive definite; return whether."""
+        return False
+
     def near_inverse(self) -> NearInverse | None:
         """Return what solves nearly for free unknowns (free,), by a past factorisation."""
         return None
@@ -335,11 +339,14 @@ class BandedTangent(StoredTangent):
     def renew(self) -> None:
         # The symmetric part takes a fifth of the time, where it is positive definite; otherwise
         # factors in single precision take two thirds.
+        if not self.renew_definite():
+            self.near = self._lu(np.float32)
+
+    def renew_definite(self) -> bool:
         factor, info = self._symmetric_factor(np.float32)
         if info == 0:
             self.near = SymmetricBand(factor, self.rank, self.order)
-        else:
-            self.near = self._lu(np.float32)
+        return info == 0
 
     def definite(self) -> bool:
         return self._symmetric_factor(np.float64)[1] == 0
@@ -464,11 +471,15 @@ class SparseTangent(StoredTangent):
         self.near = self.exact = solve
 
     def renew(self) -> None:
+        if not self.renew_definite():
+            self.factor()
+
+    def renew_definite(self) -> bool:
         symmetric = self._symmetric_part()
         # Of the finest meshes, factors in single precision may fail.
-        self.near = self.fronts.factorised(symmetric) or self.fronts.factorised(symmetric, float)
-        if self.near is None:
-            self.factor()
+        near = self.fronts.factorised(symmetric) or self.fronts.factorised(symmetric, float)
+        self.near = near or self.near
+        return near is not None
 
     def step(self, rhs: Array, new: bool) -> Array:
         return near_step(self, rhs, is_changed=False, max_rounds=14)
@@ -600,6 +611,12 @@ class BorderedTangent(AroundTangent):
     def renew(self) -> None:
         self.inner.renew()
         self.near = self._near_inverse()
+
+    def renew_definite(self) -> bool:
+        is_definite = self.inner.renew_definite()
+        if is_definite:
+            self.near = self._near_inverse()
+        return is_definite
 
     def step(self, rhs: Array, new: bool) -> Array:
         return near_step(self, rhs, new)

@@ -14,10 +14,9 @@ from ...meshes.cylinder_model import ClosedGas, InflatedModel
 from ...notes import Note
 from ..base import SNAP, History
 from . import bending
-from .closed import ClosedMembrane, closed_membrane
+from .closed import FROM_SLACK, ClosedMembrane, closed_membrane
 from .loading import IncrementRecord, Loading, RunRequest, march, reach_in_halves, straight_on
 from .membrane import initial_moduli
-from .relaxation import settled
 from .sensitivity import Neighbours
 
 Array = NDArray[np.float64]
@@ -83,8 +82,7 @@ def through_snap(
             _fill(membranes, ClosedGas(constant, outer_pressure))
             displacement = membrane.equilibrium(u + step * slope, 0.0)
             if displacement is None:
-                membrane.pressure = pressure
-                displacement = settled(membrane, u + step * slope)
+                displacement = membrane.rest(u + step * slope, 0.0)
             if displacement is None and step < 0.5 * settings.step:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.
                 displacement = membrane.equilibrium_from_slack(u, level)
@@ -264,10 +262,18 @@ class Filling(Loading):
         )
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        return self.membrane.equilibrium(start, level)
+        membrane = self.membrane
+        return membrane.rest(start, level) if self.leaps else membrane.equilibrium(start, level)
 
     def first_equilibrium(self, level: float) -> Array:
-        return self._from_slack(level, self.max_halvings)
+        initial_moduli(self.membrane.law)
+        displacement = None
+        if self.leaps:
+            unloaded = np.zeros_like(self.membrane.reference)
+            displacement = self.membrane.rest(unloaded, level, FROM_SLACK)
+        if displacement is None:
+            displacement = self._from_slack(level, self.max_halvings)
+        return displacement
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         return straight_on(levels, path, level)
@@ -371,10 +377,6 @@ class Filling(Loading):
             How often the step may be halved.
         """
         displacement = self.equilibrium(start, level)
-        if displacement is None and self.leaps and self.membrane.wrinkle_stiffness is None:
-            # Smaller steps would follow folds of a stiff wall that come and go.
-            self.membrane.pressure = level
-            displacement = settled(self.membrane, u)
         if displacement is None and halvings == self.max_halvings:
             # Folds of a cap come and go: treat it as slack before trying smaller steps.
             displacement = self.membrane.equilibrium_from_slack(u, level)
@@ -388,7 +390,6 @@ class Filling(Loading):
         Flat facets carry no pressure until they are stretched. Lower pressures are tried first
         where the search fails; SolverFailure if none leads to an equilibrium.
         """
-        initial_moduli(self.membrane.law)
         none = np.zeros_like(self.membrane.reference)
         displacement = self.membrane.equilibrium_from_slack(none, level)
         if displacement is not None:
