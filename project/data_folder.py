@@ -503,15 +503,20 @@ def _gauge_bubbles(groups: Sequence[FileGroup]) -> list[Settings]:
         test["tables"].setdefault(table.section, []).append(table)
         test.setdefault("files", {}).setdefault(table.section, []).extend(group.names)
         if not table.has_pressure:
-            pressures = [pressure_of(file) for file in group.files]
-            is_split = doubtful_name(group.files, PRESSURE_UNITS) is not None
+            pressures = _pressures_of_files(group.files)
             # Those of all lines are the same.
-            previous = test.pop("pressures", pressures)
-            is_told = None not in pressures and not is_split and previous == pressures
+            is_told = test.pop("pressures", pressures) == pressures is not None
             test |= {"pressures": pressures} if is_told else {"sizes": ["radius", "pressures"]}
             test["count_of_files"] = len(group.files)
         test["is_central"] = table.is_central and test.get("is_central", True)
     return tests
+
+
+def _pressures_of_files(files: Sequence[Path]) -> list[float] | None:
+    """Return the pressures (kPa) that files name; None where one names none, or is not clear."""
+    pressures = [pressure for file in files if (pressure := pressure_of(file)) is not None]
+    is_clear = len(pressures) == len(files) and doubtful_name(files, PRESSURE_UNITS) is None
+    return pressures if is_clear else None
 
 
 def _strips(groups: Sequence[FileGroup]) -> list[Settings]:

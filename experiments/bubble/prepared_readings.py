@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,6 +169,7 @@ class PlausibleReadings:
     #: Radius of the disk over the one that is stated, by the fall of heights from the centre.
     radius_ratio: tuple[float, float] = (0.56, 1.8)
     max_dome: float = 0.6  # largest height, over the radius, of a dome that is about a paraboloid
+    max_rim: float = 0.3  # height on the rim over that of the apex, at the lowest pressure
     min_reach: float = 0.2  # smallest distance from the centre, over the radius, that shows a fall
 
 
@@ -213,10 +214,14 @@ def _doubts_of_zero(series: ReadingSeries) -> Iterator[Doubt]:
 
 
 def _doubts_of_shape(readings: GaugeReadings, outline: Outline) -> Iterator[Doubt]:
-    """Yield a doubt if heights fall from the centre as on a disk of quite another radius."""
-    ratio = _ratio_of_radii(readings, outline)
+    """Yield doubts if heights fall from the centre as on another disk, or end above the rim."""
+    largest = _dome(readings, outline, np.max)
+    least = _dome(readings, outline, np.min)
+    if largest is None or least is None or largest.apex > PLAUSIBLE.max_dome * outline.radius:
+        return
     low, high = PLAUSIBLE.radius_ratio
-    if not low < ratio < high:
+    if not low < largest.radius_ratio < high:
+        ratio = largest.radius_ratio
         radius = outline.radius
         fall = f"as on a disk of radius {ratio * radius:.3g} mm" if ratio < 100 else "nowhere"
         words = (
@@ -224,26 +229,45 @@ def _doubts_of_shape(readings: GaugeReadings, outline: Outline) -> Iterator[Doub
             "the radius right (not the diameter), and the places of the gauges?"
         )
         yield Doubt("radius", False, words)
+    is_constant = low < least.at_rim / max(largest.at_rim, 1e-9) < high
+    has_risen = largest.apex > 1.5 * least.apex
+    if is_constant and has_risen and least.at_rim > PLAUSIBLE.max_rim * least.apex:
+        words = (
+            f"the heights end about {least.at_rim:.3g} mm above the rim at the lowest pressure, "
+            f"and {largest.at_rim:.3g} mm at the largest: all count from the sheet at rest; "
+            "subtract what is read there, or let [bubble.nuisance] height_offset find it"
+        )
+        yield Doubt("not-zeroed", False, words)
 
 
-def _ratio_of_radii(readings: GaugeReadings, outline: Outline) -> float:
-    """Return the radius by the fall of the heights over that of the outline; 1 if it is not told.
+@dataclass(frozen=True)
+class Dome:
+    """A paraboloid through heights at one pressure, mm: at the apex, and where the rim is."""
 
-    At the largest pressure a sheet is about a paraboloid, which is zero on the rim.
-    """
+    apex: float
+    at_rim: float
+
+    @property
+    def radius_ratio(self) -> float:
+        """Return the radius on which the height is zero over that of the rim."""
+        return float(np.sqrt(self.apex / max(self.apex - self.at_rim, 1e-9 * self.apex)))
+
+
+def _dome(
+    readings: GaugeReadings, outline: Outline, chosen: Callable[[Array], float]
+) -> Dome | None:
+    """Return the dome at the least or the largest pressure; None where too few places tell it."""
     heights = [s for s in readings.series if s.quantity == "height"]
     if not heights:
-        return 1.0
+        return None
     pressure = np.concatenate([s.pressure for s in heights])
-    rows = pressure > (1 - LIMITS.pressure_scatter) * pressure.max()
+    rows = np.abs(pressure / chosen(pressure) - 1) < LIMITS.pressure_scatter
     squares = np.concatenate([outline.share(s.positions) ** 2 for s in heights])[rows]
     height = np.concatenate([s.value - (s.at_rest or 0.0) for s in heights])[rows]
     if np.ptp(squares) < PLAUSIBLE.min_reach**2:
-        return 1.0
+        return None
     slope, apex = np.polyfit(squares, height, 1)
-    if not 0 < apex < PLAUSIBLE.max_dome * outline.radius:
-        return 1.0
-    return float(np.sqrt(apex / max(-slope, 1e-9 * apex)))
+    return Dome(float(apex), float(apex + slope)) if apex > 0 else None
 
 
 def _doubts_of_modulus(

@@ -132,6 +132,14 @@ def test_readings_of_a_release_that_are_left_out_are_counted(heights, order, lef
     assert not prepared_of(bubble).doubts(UNKNOWN)
 
 
+@pytest.mark.parametrize(("offset", "names"), [(0.0, []), (1.0, []), (12.5, ["not-zeroed"])])
+def test_heights_that_end_above_the_rim_are_doubted(heights, offset, names):
+    prepared = prepared_of(gauged(heights + offset))
+    assert [doubt.name for doubt in prepared.doubts(UNKNOWN)] == names
+    prepared = prepared_of(gauged(heights + offset, nuisance={"height_offset": 20.0}))
+    assert not prepared.doubts(UNKNOWN)
+
+
 @pytest.mark.parametrize(("air", "is_doubted"), [(0.0, False), (0.1013, True), (0.3, False)])
 def test_absolute_pressures_are_doubted(heights, air, is_doubted):
     keys = {"radius": 100.0, "elements": 48, "symmetry": "quarter", "noise": 0.05}
