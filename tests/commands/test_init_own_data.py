@@ -392,7 +392,7 @@ def test_the_data_of_the_example_are_small():
 
 def test_a_data_folder_needs_own(tmp_path):
     with pytest.raises(InputError, match="means nothing without --own"):
-        start.init_command.callback.__wrapped__(tmp_path, None, False, None, data=DATA)
+        start.init_command.callback(tmp_path, None, False, None, data=DATA)
 
 
 def test_number_of_tests_is_refused_beside_files_that_tell_it(tmp_path):

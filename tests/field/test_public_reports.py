@@ -52,6 +52,7 @@ READ = {
     "decimal commas": (table(HEADINGS.replace(",", ";"), GERMAN), "utf-8", 0),
     "carriage returns": (table(end="\r"), "utf-8", 0),
     "words for no value": (table(rows=with_row("10,50,0.5,nan,NaN,NaN")), "utf-8", 1),
+    "spreadsheet's no value": (table(rows=with_row("10,50,0.5,1,2,#N/A")), "utf-8", 1),
     "cut in the last row": (table()[:-9] + "\n", "utf-8", 1),
 }
 
@@ -87,7 +88,6 @@ REFUSED = {
         table(rows=[",".join(v.replace(".", ",") for v in row.split(",")) for row in ROWS]),
         "decimal commas need another separator",
     ),
-    "spreadsheet's no value": (table(rows=with_row("10,50,0.5,1,2,#N/A")), "found '#N/A'"),
     "infinity": (table(rows=with_row("10,50,0.5,inf,0.2,0.3")), "found 'inf'"),
     "exponents of Fortran": (table(rows=with_row("10,50,0.5,1.0D-01,1,1")), "found '1.0D-01'"),
     "typographic minus": (table(rows=with_row("\u221210,50,0.5,1,1,1")), "found '\u221210'"),
