@@ -198,7 +198,9 @@ class _SharedMemory:
     def __init__(self, size: int = _SHARED_BYTES) -> None:
         import mmap
 
-        self._bytes = memoryview(mmap.mmap(-1, size))
+        self._bytes = memoryview(bytearray())  # where there is none, all goes by the pipe
+        with suppress(OSError):
+            self._bytes = memoryview(mmap.mmap(-1, size))
 
     def pack(self, results: Any) -> tuple[bytes, list[int]]:
         """Return results pickled without arrays, which are written here, and the sizes of these."""

@@ -120,6 +120,16 @@ def test_arrays_of_a_copy_come_back_as_they_were_if_memory_holds_them_or_not(siz
     copied["rows"][:] = 0.0
 
 
+def test_machine_without_memory_to_share_passes_arrays_by_the_pipe(monkeypatch):
+    def refuse(*_):
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr("mmap.mmap", refuse)
+    with may_run_at_once(2):
+        first, second = run_side_by_side(lambda number: np.full(3, number), 2)
+    assert first.tolist() == [0, 0, 0] and second.tolist() == [1, 1, 1]
+
+
 def test_error_in_a_copy_is_raised_here():
     def do(number, message):
         if number == 1:
