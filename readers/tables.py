@@ -350,7 +350,7 @@ def check_row(
 #: Cells, in small letters, that stand for no value: empty, and what C, .NET and spreadsheets write.
 HOLES = (
     *("", "-", "--", "---", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind"),
-    *("n. def.", "n/a", "na", "n.a.", "null"),
+    *("n. def.", "n/a", "na", "n.a.", "#n/a", "#nv", "null"),
 )
 NUMBER = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
 _NUMBER = re.compile(NUMBER)

@@ -461,7 +461,7 @@ def test_columns_of_gauges_that_are_not_one_each_are_refused(tmp_path, names, wo
 
 def test_reading_that_one_gauge_lacks_is_left_out_alone(tmp_path):
     rows = [f"{p},{h},{0.75 * h}" for p, h in zip(KILO, RISE, strict=True)]
-    for hole in ("", "n/a", "-", "NA"):
+    for hole in ("", "n/a", "-", "#N/A", "#NV"):
         text = "\n".join([*rows[:2], f"{KILO[2]},{RISE[2]},{hole}", *rows[3:]])
         (tmp_path / "h.csv").write_text(f"p (kPa),apex (mm),warp 50 (mm)\n{text}\n")
         keys = 'files = ["h.csv"]\nplaces = [[0, 0], [50, 0]]\n'
