@@ -169,6 +169,8 @@ class PlausibleReadings:
     #: Radius of the disk over the one that is stated, by the fall of heights from the centre.
     radius_ratio: tuple[float, float] = (0.56, 1.8)
     max_dome: float = 0.6  # largest height, over the radius, of a dome that is about a paraboloid
+    #: Largest strain of the apex over that of a cap of its curvature.
+    strain_ratio: tuple[float, float] = (0.4, 3.0)
     max_rim: float = 0.3  # height on the rim over that of the apex, at the lowest pressure
     min_reach: float = 0.2  # smallest distance from the centre, over the radius, that shows a fall
 
@@ -190,6 +192,7 @@ def _doubts_of_readings(test: BubbleTest, readings: GaugeReadings) -> list[Doubt
             doubts += _doubts_of_heights(series, test.outline.radius)
             if test.height_offset is None:
                 doubts += _doubts_of_zero(series)
+    doubts += _doubts_of_strain(readings, test.outline)
     if test.height_offset is None:
         doubts += _doubts_of_shape(readings, test.outline)
     left_out = max((series.left_out for series in readings.series), default=0)
@@ -211,6 +214,28 @@ def _doubts_of_zero(series: ReadingSeries) -> Iterator[Doubt]:
             "rest; subtract it, or let [bubble.nuisance] height_offset find it"
         )
         yield Doubt("not-zeroed", False, words)
+
+
+def _doubts_of_strain(readings: GaugeReadings, outline: Outline) -> Iterator[Doubt]:
+    """Yield a doubt if the strains of the apex are not those of a cap of the curvatures read."""
+    largest: dict[str, list[float]] = {"curvature": [], "strain": []}
+    for series in readings.series:
+        if series.quantity in largest:
+            largest[series.quantity].append(float(np.abs(series.value).max()))
+    if not all(largest.values()):
+        return
+    curvature, strain = (float(np.mean(values)) for values in largest.values())
+    # Of a cap of height h = R^2 k / 2, as 2/3 (h / R)^2.
+    cap_strain = (outline.dome_radius * curvature) ** 2 / 6
+    low, high = PLAUSIBLE.strain_ratio
+    if not low < strain / cap_strain < high:
+        words = (
+            f"the apex strains by {100 * strain:.3g} % where its curvature is {curvature:.3g} "
+            f"1/mm, and a cap of that by about {100 * cap_strain:.3g} %: are strain_unit, "
+            "curvature_unit, curvature_is and the radius right?"
+        )
+        is_sure = not low / 10 < strain / cap_strain < 10 * high
+        yield Doubt("strain-rise", is_sure, words)
 
 
 def _doubts_of_shape(readings: GaugeReadings, outline: Outline) -> Iterator[Doubt]:

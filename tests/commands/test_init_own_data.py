@@ -197,7 +197,10 @@ def test_a_spreadsheet_of_pressure_and_apex_height_is_a_balanced_sheet(tmp_path)
 
 @pytest.mark.parametrize(("unit", "power"), [("1/mm", 1), ("mm", -1)])
 def test_a_table_of_the_apex_passes_the_check(tmp_path, unit, power):
-    rows = [f"{p},{(1e-4 * h) ** power},{2e-3 * h}" for p, h in zip(PRESSURES, APEX, strict=True)]
+    rows = [
+        f"{p},{(2 * h / 100**2) ** power},{2 / 3 * (h / 100) ** 2}"
+        for p, h in zip(PRESSURES, APEX, strict=True)
+    ]
     text = "\n".join([f"p (kPa),curvature warp ({unit}),strain warp (mm/mm)", *rows])
     (bubble,) = check_of_tables(tmp_path, {"apex.csv": text}, "--radius", 100)["bubble"]
     assert bubble["data"]["apex"]["files"] == ["apex.csv"] and "sheet" not in bubble

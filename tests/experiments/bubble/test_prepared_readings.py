@@ -132,6 +132,28 @@ def test_readings_of_a_release_that_are_left_out_are_counted(heights, order, lef
     assert not prepared_of(bubble).doubts(UNKNOWN)
 
 
+@pytest.mark.parametrize(
+    ("strain", "curvature", "sure"),
+    [
+        (1.0, 1.0, None), (100.0, 1.0, True), (0.01, 1.0, True), (1.0, 0.5, False),
+        (1.0, 2.0, False), (1.0, 1e-3, True), (0.0, 1.0, True), (1.4, 1.0, None),
+    ],
+)  # fmt: skip
+def test_strains_of_the_apex_go_with_its_curvature(heights, strain, curvature, sure):
+    prepared = prepared_of(gauged(heights[:1], places=None))
+    (series,) = prepared.readings.series
+    of_strain = replace(series, quantity="strain", value=strain * 2 / 3 * (series.value / 100) ** 2)
+    value = curvature * 2 * series.value / 100**2
+    readings = replace(
+        prepared.readings, series=(of_strain, replace(series, quantity="curvature", value=value))
+    )
+    changed = PreparedReadings(replace(prepared.test, data=readings))
+    doubts = changed.doubts(UNKNOWN)
+    assert [(doubt.name, doubt.sure) for doubt in doubts] == [("strain-rise", sure)] * (
+        sure is not None
+    )
+
+
 @pytest.mark.parametrize(("offset", "names"), [(0.0, []), (1.0, []), (12.5, ["not-zeroed"])])
 def test_heights_that_end_above_the_rim_are_doubted(heights, offset, names):
     prepared = prepared_of(gauged(heights + offset))
