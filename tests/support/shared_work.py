@@ -64,13 +64,17 @@ def rotated(files):
     return [*files[first:], *files[:first]]
 
 
+#: Keys of texts in a specification.
+TITLES = {"usermeta", "title", "text"}
+
+
 def kind_of(part):
-    """Return a specification without its numbers that are not whole, and each kind of item once."""
-    if isinstance(part, float):
-        return 0.0
+    """Return a specification without numbers and titles, and each kind of item once."""
+    if isinstance(part, int | float) and not isinstance(part, bool):
+        return 0
     if isinstance(part, dict):
-        return {key: kind_of(value) for key, value in part.items()}
-    if isinstance(part, list):
+        return {key: kind_of(value) for key, value in part.items() if key not in TITLES}
+    if isinstance(part, list | tuple):
         return list({json.dumps(kind_of(value)): None for value in part})
     return part
 
@@ -78,8 +82,8 @@ def kind_of(part):
 class Drawings:
     """Draw a chart of each kind once, with a converter; the drawings lie in a folder.
 
-    Charts of one kind differ in their numbers, at which no test looks in a drawing; to draw takes a
-    third of the time of a command. tests/reports draws every chart.
+    Charts of one kind differ in numbers and titles, at which no test looks in a drawing; to draw
+    takes a third of the time of a command. tests/reports draws every chart.
     """
 
     def __init__(self, convert, folder):
