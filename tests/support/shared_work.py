@@ -7,6 +7,7 @@ import shutil
 import sys
 import tempfile
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from .paths import ROOT
@@ -97,8 +98,9 @@ class Drawings:
             drawing = self.convert(kind, spec)
             complete = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
             complete.write_bytes(drawing)
-            complete.rename(path)
-            return drawing
+            with suppress(FileExistsError):  # that of another process, drawn meanwhile, stays
+                path.hardlink_to(complete)
+            complete.unlink()
         return path.read_bytes()
 
 
