@@ -77,8 +77,8 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
 def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
     """Hold the folder that a function writes, its argument `out` or `folder`, while it runs.
 
-    BLAS has one thread meanwhile.
-    Grave notes of the result are given to `warnings.warn`; those of fits within it are not.
+    BLAS has one thread meanwhile. Grave notes of the result are given to `warnings.warn`; those of
+    fits within it are not.
     """
     signature = inspect.signature(function)
 

@@ -264,7 +264,7 @@ def pressure_unit(view: MeasuredView) -> Iterator[Doubt]:
 
 @dataclass(frozen=True)
 class AbsolutePressure:
-    """What shows that pressures count from vacuum, not from the air around; in MPa."""
+    """Hold the signs that pressures count from vacuum, not from the air around; in MPa."""
 
     air: tuple[float, float] = (0.085, 0.108)  # on high mountains, and in the deepest low
     first: float = 1.3  # the lowest pressure over the air's: the sheet has hardly risen there

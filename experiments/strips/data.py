@@ -312,10 +312,10 @@ def _errors_of_breaks(rows: Array, pairs: Array) -> Array:
     columns = np.column_stack([np.zeros(len(pairs), dtype=int), pairs + 1])
     terms = rows[:, columns].swapaxes(0, 1)
     axes, upper = np.linalg.qr(terms)
-    # A break that no point tells from another one adds no direction: what is left of it is zero
-    # but for rounding.
-    left = np.abs(np.diagonal(upper, axis1=1, axis2=2))
-    rounding = len(load) * np.finfo(float).eps * left.max(axis=1, keepdims=True)
-    axes *= (left > rounding)[:, None]
+    # A break that no point tells from another one adds no direction: what remains of it without
+    # the other terms is zero but for rounding.
+    remainder = np.abs(np.diagonal(upper, axis1=1, axis2=2))
+    rounding = len(load) * np.finfo(float).eps * remainder.max(axis=1, keepdims=True)
+    axes *= (remainder > rounding)[:, None]
     fitted = np.einsum("pki,pi->pk", axes, load @ axes)
     return ((load - fitted) ** 2).sum(axis=1)

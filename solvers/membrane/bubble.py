@@ -6,10 +6,10 @@ the pressure falls. There the rise of a node is prescribed, and the pressure is 
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
@@ -18,7 +18,7 @@ from ...meshes.disk import rim_form, rim_share
 from ..base import History
 from ..pretension import stretched
 from .cords import cords_on_sheet
-from .factorisation import SingularTangent, tangent_for
+from .factorisation import SingularTangent, Tangent, tangent_for
 from .kernel import reference_elements
 from .loading import (
     IncrementRecord,
@@ -44,18 +44,7 @@ def prepare(
     """Return the membrane of a bubble; it has no use for `wall`."""
     points, quads = arrays_of(model.mesh)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
-    return Membrane(
-        points,
-        quads,
-        reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
-        model.thickness,
-        law,
-        free,
-        tangent_for(quads, points, free),
-        tolerance,
-        step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-        cords=cords_on_sheet(model),
-    )
+    return _membrane_of(model, law, free, tangent_for(quads, points, free), tolerance)
 
 
 def with_sheet(membrane: Membrane, model: BubbleModel) -> Membrane:
@@ -63,12 +52,28 @@ def with_sheet(membrane: Membrane, model: BubbleModel) -> Membrane:
 
     The storage of its tangent, which has a quarter of the work of `prepare`, is used further.
     """
+    tangent = membrane.tangent
+    return _membrane_of(model, membrane.law, membrane.free, tangent, membrane.tolerance)
+
+
+def _membrane_of(
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    free: NDArray[np.intp],
+    tangent: Tangent,
+    tolerance: float,
+) -> Membrane:
+    """Return the membrane of a bubble with the storage `tangent` for its unknowns `free`."""
     points, quads = arrays_of(model.mesh)
-    return replace(
-        membrane,
-        reference=points,
-        elements=reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
-        thickness=model.thickness,
+    return Membrane(
+        points,
+        quads,
+        reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
+        model.thickness,
+        law,
+        free,
+        tangent,
+        tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
         cords=cords_on_sheet(model),
     )

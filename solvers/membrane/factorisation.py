@@ -477,9 +477,9 @@ class SparseTangent(StoredTangent):
     def renew_definite(self) -> bool:
         symmetric = self._symmetric_part()
         # Of the finest meshes, factors in single precision may fail.
-        near = self.fronts.factorised(symmetric) or self.fronts.factorised(symmetric, float)
-        self.near = near or self.near
-        return near is not None
+        factors = self.fronts.factorised(symmetric) or self.fronts.factorised(symmetric, float)
+        self.near = factors or self.near
+        return factors is not None
 
     def step(self, rhs: Array, new: bool) -> Array:
         return near_step(self, rhs, is_changed=False, max_rounds=14)
